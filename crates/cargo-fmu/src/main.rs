@@ -59,27 +59,29 @@ enum Command {
         #[command(flatten)]
         check: fmu_check::Options,
     },
+    /// Execute the calls of a finding in a report of `check --out` again; the exit status is 1 if the finding shows
+    Replay(fmu_check::ReplayOptions),
 }
 
 fn main() -> ExitCode {
     fmu_check::run_worker_if_requested();
     let Cargo::Fmu(command) = Cargo::parse();
     match carry_out(&command) {
-        Ok(true) => ExitCode::SUCCESS,
-        // The reason has been printed.
-        Ok(false) => ExitCode::FAILURE,
+        Ok(status) => status,
         Err(error) => terminal::exit(Err(error)),
     }
 }
 
-/// Carries out a command. Returns false if it failed and has printed the reason.
-fn carry_out(command: &Command) -> Result<bool> {
-    match command {
+/// Carries out a command, and returns the exit status. If a command failed and has printed the reason, the status is 1.
+fn carry_out(command: &Command) -> Result<ExitCode> {
+    let succeeds = match command {
         Command::New(options) => new::new(options).map(|()| true),
         Command::Build { package, build, .. } => {
             builder::build(&Project::find(package)?, build, Purpose::Release, &builder::arguments_of_build())
         }
         Command::Run(options) => run::run(options),
         Command::Check { package, fmu, check } => run::check(package, fmu, check),
-    }
+        Command::Replay(options) => return Ok(fmu_check::replay(options)),
+    };
+    succeeds.map(|succeeds| if succeeds { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -1,8 +1,8 @@
 //! Rules that hold for every run, about writes to arrays, statuses, strings, logged messages and processes that are left.
 
-use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps};
+use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps, step_name};
 use crate::description::Description;
-use crate::finding::{Criterion, Finding, SharedCriterion, status_name, step_name};
+use crate::finding::{Criterion, Finding, SharedCriterion, status_name};
 use crate::rules;
 use crate::writer::LONG_NAME;
 use fmi_abi::Standard;

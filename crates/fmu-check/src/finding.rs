@@ -1,6 +1,7 @@
 //! Findings, and the criteria that recognize them in a run.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_of};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_name, step_of};
+use crate::evidence::Replay;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -48,18 +49,18 @@ pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
 }
 
-/// Result of the program of a finding.
+/// Whether the calls of a finding show it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Proof {
-    /// There is no program, because the finding concerns the files of the FMU.
+    /// There are no calls, because the finding concerns the files of the FMU.
     #[default]
     Files,
-    /// The program shows the finding.
+    /// The calls have shown the finding twice, each time in new processes.
     Shown,
-    /// The program does not show the finding, for this reason.
+    /// The calls do not show the finding again, for this reason.
     NotShown(String),
-    /// The program was not run, for this reason.
+    /// The calls were not repeated, for this reason.
     NotRun(String),
 }
 
@@ -82,10 +83,15 @@ pub struct Finding {
     /// Call sequence that reproduces the finding; empty for a finding in the files of the FMU.
     #[serde(skip)]
     pub sequence: CallSequence,
-    /// Program in C that should reproduce the finding; empty if there is none.
-    pub c: String,
-    /// Whether the program shows the finding; if not, the reason.
+    /// Calls of the sequence as text, each with its number; empty for a finding in the files of the FMU.
+    pub calls: Vec<String>,
+    /// Results of the calls that together show the finding, as text.
+    pub expected: Vec<String>,
+    /// Whether the calls show the finding again; if not, the reason.
     pub proof: Proof,
+    /// Calls for `fmu-check replay`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replay: Option<Replay>,
     /// Criterion that a run violates if it reproduces the finding.
     #[serde(skip)]
     pub criterion: Option<SharedCriterion>,
@@ -105,7 +111,7 @@ impl Finding {
         Self { sequence, criterion: Some(criterion), ..self }
     }
 
-    /// Records whether the program shows the finding. A finding that its program does not show is a note.
+    /// Records whether the calls show the finding again. A finding that they do not show is a note.
     pub fn judge(&mut self, proof: Proof) {
         if matches!(proof, Proof::NotShown(_)) {
             self.severity = Severity::Note;
@@ -135,26 +141,6 @@ pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
             format!("{name} leads to {count} processes at a time, after which all were ended")
         }
     })
-}
-
-/// Returns a short description of a step.
-pub fn step_name(step: &Step) -> String {
-    match step {
-        Step::Make(..) => "the instantiation".to_owned(),
-        Step::Free(_) => "FreeInstance".to_owned(),
-        Step::Call { function, .. } | Step::Version(function) => function.clone(),
-        Step::Repeat(times, steps) => format!(
-            "one of {times} repetitions of {}",
-            steps.first().map_or("nothing".to_owned(), |numbered| step_name(&numbered.step))
-        ),
-        Step::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
-        Step::Integrate(..) => "an integration".to_owned(),
-        Step::Measure => "a measurement".to_owned(),
-        Step::FreshProcess => "a fresh process".to_owned(),
-        Step::Elsewhere(_) => "another directory".to_owned(),
-        Step::Unload => "unloading the library".to_owned(),
-        Step::Quit => "the exit of the process".to_owned(),
-    }
 }
 
 /// Result of an update of the discrete states.

@@ -87,7 +87,7 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
                 is_here && state.mode == Mode::ContinuousTime
             }),
             Step::Unload | Step::Quit => objects.instances.is_empty(),
-            Step::Version(_) | Step::Measure | Step::Elsewhere(_) => true,
+            Step::Version(_) | Step::Measure | Step::Elsewhere(_) | Step::Copies(..) => true,
         };
         if !is_legal {
             return Some(*id);

@@ -3,12 +3,13 @@
 //! ## Inside
 //!
 //! A check writes a call sequence (`writer`, `call_sequence`), which a separate process executes (`run`, `worker`), and evaluates
-//! the results. The call sequence of a finding is shortened (`shrink`) so that the standard still allows it (`legal`), and
-//! written as a program in C (`reproduce`). All `unsafe` code is in `worker`, which loads and calls the library of the FMU in
-//! processes that may crash.
+//! the results. The call sequence of a finding is shortened (`shrink`) so that the standard still allows it (`legal`), executed
+//! twice, and written to the report with the results that show the finding (`reproduce`, `evidence`), from which `replay` executes
+//! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
-//! Each module uses only modules before it: `random`, `call_sequence`, `finding`, `rules`, `description`, `values`, `legal`,
-//! `writer`, `shrink`, `worker`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `baseline`, `report`.
+//! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `description`,
+//! `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `schedule`,
+//! `baseline`, `report`, `replay`.
 
 mod always;
 mod baseline;
@@ -16,14 +17,17 @@ mod call_sequence;
 mod checker;
 mod checks;
 mod description;
+mod evidence;
 mod finding;
 mod legal;
 mod options;
 mod random;
+mod replay;
 mod report;
 mod reproduce;
 mod rules;
 mod run;
+mod schedule;
 mod shrink;
 mod trajectory;
 mod values;
@@ -34,26 +38,22 @@ mod writer;
 pub use checker::Unchecked;
 pub use finding::{Finding, Proof, Severity};
 pub use options::{FailOn, Options};
+pub use replay::{ReplayOptions, replay};
 pub use report::Report;
 pub use worker::run_worker_if_requested;
 
 use anyhow::Context as _;
 use checker::Checker;
-use checks::Check;
 use description::Description;
 use fmi_abi::Interface;
 use options::INTERFACES;
 use run::Stop;
+use schedule::{execute_checks, prove, stop};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use trajectory::{NoTrajectory, find_trajectory};
-
-/// Reason that the report states for a topic until all its checks have ended, because the report is written after every check.
-const UNFINISHED: &str = "it is not finished";
 
 /// Topics that are not part of a quick check.
 const LONG: [&str; 2] = ["malformed", "resources"];
@@ -113,12 +113,6 @@ const ALWAYS: [&str; 6] = [
     "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
-/// Returns the reason why a part was not checked. After an interrupt this is the interrupt, because the error may only say that a
-/// process or a file is missing.
-fn stop(error: &anyhow::Error) -> String {
-    if worker::interrupted() { Stop::Interrupted.to_string() } else { error.to_string() }
-}
-
 /// Finds a successful simulation for each interface type that has a library, and records the interface types for which none
 /// succeeds as not checked.
 fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
@@ -149,7 +143,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
     // The checker is dropped before the directory is removed, because its processes use the directory until they end.
-    let (scratch, mut checker) = opened(path, options, begin)?;
+    let (_scratch, mut checker) = opened(path, options, begin)?;
     simulate(&mut checker)?;
     let session = Session { path, options, baseline, begin };
     // The report is written after every check, so that earlier findings are not lost if this process is killed.
@@ -160,7 +154,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     execute_checks(&checker, progress, &|topic| is_wanted(options, topic), &write_report)?;
     let mut findings = session.wanted_findings(&checker);
     if !worker::interrupted() {
-        prove(&checker, &mut findings, scratch.path(), options, progress);
+        prove(&checker, &mut findings, options, progress);
     }
     Ok(session.report(&checker, findings))
 }
@@ -351,111 +345,4 @@ fn setting(
         repetitions: options.repeat,
     };
     (setting, without)
-}
-
-/// Returns the number of threads that execute checks: one for each processor, at most 8.
-fn threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from).min(8)
-}
-
-/// Calls `each` on several threads with every item and the number of items that have begun. If `progress` is set, the line that
-/// `each` returns is printed.
-fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    std::thread::scope(|scope| {
-        for _ in 0..threads() {
-            scope.spawn(|| {
-                while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let line = each(item, done.fetch_add(1, Ordering::Relaxed) + 1);
-                    if progress {
-                        eprint!("\r{line}");
-                        let _ = std::io::stderr().flush();
-                    }
-                }
-            });
-        }
-    });
-    if progress {
-        eprint!("\r{:79}\r", "");
-    }
-}
-
-/// Executes a check: with a simulation if the check fits the simulation, without one if the check is executed once per FMU. In
-/// other cases does nothing.
-fn execute_check(
-    checker: &Checker,
-    check: Check,
-    trajectory: Option<&writer::Trajectory>,
-) -> anyhow::Result<()> {
-    match (check, trajectory) {
-        (Check::Once(check), None) => check(checker),
-        (Check::Each(fits, check), Some(trajectory)) if fits.fit(checker, trajectory) => {
-            check(checker, trajectory)
-        }
-        (Check::Malformed(rule, fits, write), Some(trajectory)) if fits.fit(checker, trajectory) => {
-            checks::malformed::all(checker, rule, write(checker, trajectory)?)
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Executes all checks of the wanted topics on several threads, and calls `write_report` after each check. Returns an error if a
-/// check or `write_report` fails; a check that is stopped does not fail.
-fn execute_checks(
-    checker: &Checker,
-    progress: bool,
-    wanted: &(impl Fn(&str) -> bool + Sync),
-    write_report: &(impl Fn() -> anyhow::Result<()> + Sync),
-) -> anyhow::Result<()> {
-    let wanted_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
-    let jobs: Vec<_> = wanted_checks
-        .flat_map(|(topic, check)| {
-            let each = checker.trajectories.iter().map(Some);
-            std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))
-        })
-        .collect();
-    // The report lists a topic as not checked until all its checks have ended.
-    let remaining: Vec<(&str, AtomicUsize)> = rules::TOPICS
-        .into_iter()
-        .map(|topic| (topic, AtomicUsize::new(jobs.iter().filter(|(of, ..)| *of == topic).count())))
-        .filter(|(_, count)| count.load(Ordering::Relaxed) > 0)
-        .collect();
-    remaining.iter().for_each(|(topic, _)| checker.unchecked(topic, UNFINISHED.to_owned()));
-    let (failure, writing) = (Mutex::new(None), Mutex::new(()));
-    in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
-        let result = match execute_check(checker, *check, *trajectory) {
-            Err(error) if error.is::<Stop>() || worker::interrupted() => {
-                checker.stopped(topic, stop(&error));
-                Ok(())
-            }
-            result => result,
-        };
-        let counts = remaining.iter().filter(|(of, _)| of == topic);
-        if counts.map(|(_, count)| count.fetch_sub(1, Ordering::Relaxed)).any(|count| count == 1) {
-            checker.finished(topic, UNFINISHED);
-        }
-        let one_at_a_time = writing.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = result.and_then(|()| write_report()) {
-            *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-        }
-        drop(one_at_a_time);
-        let remaining = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
-        let (all, executed) = (jobs.len(), checker.executed());
-        format!("{done} of {all} checks, {executed} call sequences run, {remaining} s remaining: {topic:20}")
-    });
-    failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
-}
-
-/// Shortens the call sequences of all findings and runs their programs. Each finding gets an equal share of the remaining time.
-fn prove(checker: &Checker, findings: &mut [Finding], scratch: &Path, options: &Options, progress: bool) {
-    let count = findings.len();
-    let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();
-    in_parallel(&slots, progress, |slot, number| {
-        let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        let rounds = (count + 1 - number).div_ceil(threads());
-        let share =
-            checker.end.saturating_duration_since(Instant::now()) / u32::try_from(rounds).unwrap_or(1);
-        checker.prove(&mut finding, scratch, !options.no_shrink, Instant::now() + share);
-        format!("the shortest calls for {count} findings: {:40}", finding.name)
-    });
 }

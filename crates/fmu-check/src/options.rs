@@ -15,7 +15,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
         rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
-    /// Maximum duration of the check in seconds, including the programs that reproduce findings.
+    /// Maximum duration of the check in seconds, including the repetitions that prove findings.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
     /// Maximum duration of a call sequence in seconds; a longer one is a hang if it also exceeds three times this limit when it
@@ -41,8 +41,7 @@ pub struct Options {
     /// Prints a rule, its severity and its section of the standard; `all` prints all rules.
     #[arg(long, value_name = "RULE")]
     pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and, for each finding that calls reproduce, a C program to this
-    /// directory.
+    /// Writes report.html, report.json, junit.xml and report.sarif to this directory.
     #[arg(long, value_name = "DIRECTORY")]
     pub out: Option<PathBuf>,
     /// Prints the report as JSON.

@@ -1,13 +1,13 @@
 //! Executes call sequences in separate processes.
 
 use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
-#[cfg(target_os = "linux")]
-use crate::worker::Program;
 use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+#[cfg(not(target_os = "linux"))]
+use std::process::Stdio;
 
 /// Starts the processes that execute call sequences.
 pub struct Workers {
@@ -79,11 +79,28 @@ impl Workers {
 
     /// Executes a call sequence with a limit in seconds for each process. Each `FreshProcess` step starts another process.
     pub fn execute(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+        self.execute_or_stop(setting, sequence, limit, None)
+    }
+
+    /// Executes a call sequence. The process with the step of the number `stop_before` waits for a debugger before this step, and
+    /// then has no limit.
+    pub fn execute_or_stop(
+        &self,
+        setting: &Setting,
+        sequence: &CallSequence,
+        limit: f64,
+        stop_before: Option<u32>,
+    ) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
         for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
-            let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes };
-            let ended = self.process(&job, (phase, setting.now), limit)?;
+            let stop_before = stop_before.filter(|id| part.iter().any(|numbered| numbered.id == *id));
+            let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes, stop_before };
+            let kind = (phase, setting.now);
+            let ended = match stop_before {
+                None => self.process(&job, kind, limit)?,
+                Some(_) => self.debugged(&job, kind)?,
+            };
             bytes = add_outcomes(part, ended, limit, &mut run)?;
             if run.end != End::Done {
                 break;
@@ -92,38 +109,9 @@ impl Workers {
         Ok(run)
     }
 
-    /// Runs a program with the directory of the FMU as its argument. Returns its exit status, or `None` if it did not end within
-    /// the limit. On Linux, the program is confined like a call sequence, and the result is 1 if a signal ended the program or it
-    /// started too many processes.
-    pub fn program(
-        &self,
-        program: &Path,
-        fmu: &Path,
-        memory: u64,
-        limit: f64,
-    ) -> anyhow::Result<Option<i32>> {
-        #[cfg(target_os = "linux")]
-        {
-            let program = Program { program: program.to_owned(), fmu: fmu.to_owned(), memory };
-            let ended = self.process(&program, (0, false), limit)?;
-            // If a signal or too many processes ended the program, the FMU is the cause, so the program has shown the finding.
-            let is_fault = ended.flood.is_some() || ended.signal.is_some();
-            Ok(if is_fault { Some(1) } else { ended.code })
-        }
-        #[cfg(not(target_os = "linux"))]
-        {
-            let _ = memory;
-            let mut command = Command::new(program);
-            command.arg(fmu).env("TMPDIR", &self.scratch);
-            command.stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
-            command.stderr(std::process::Stdio::null());
-            Ok(self.wait(&mut command, limit)?.and_then(|status| status.code()))
-        }
-    }
-
     /// Executes a job in a process that an idle server forks.
     #[cfg(target_os = "linux")]
-    fn process(&self, job: &impl serde::Serialize, kind: WorkerKind, limit: f64) -> anyhow::Result<Ended> {
+    fn process(&self, job: &Job, kind: WorkerKind, limit: f64) -> anyhow::Result<Ended> {
         let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let server = idle().get_mut(&kind).and_then(Vec::pop);
         let mut server = match server {
@@ -145,19 +133,34 @@ impl Workers {
     /// Executes a job in a new process, because systems other than Linux cannot load every library after a fork.
     #[cfg(not(target_os = "linux"))]
     fn process(&self, job: &Job, kind: WorkerKind, limit: f64) -> anyhow::Result<Ended> {
-        use std::process::Stdio;
+        let (directory, mut command, output) = self.new_process(job, kind)?;
+        command.stdin(Stdio::null()).stderr(output);
+        let ended = self.wait(&mut command, limit)?;
+        Ok(with_files(ended.map(Ended::from).unwrap_or_default(), directory.path()))
+    }
+
+    /// Executes a job in a new process that has the input and the standard error of this one, and no limit of time.
+    fn debugged(&self, job: &Job, kind: WorkerKind) -> anyhow::Result<Ended> {
+        let (directory, mut command, _) = self.new_process(job, kind)?;
+        let status = command.status().context("a process for the FMU cannot be started")?;
+        Ok(with_files(Ended::from(status), directory.path()))
+    }
+
+    /// Writes a job to a file. Returns the directory of its files, the command that starts a process for it, and the file for the
+    /// output of the process.
+    fn new_process(
+        &self,
+        job: &Job,
+        kind: WorkerKind,
+    ) -> anyhow::Result<(tempfile::TempDir, Command, std::fs::File)> {
         let directory = tempfile::Builder::new().prefix("run-").tempdir_in(&self.scratch)?;
         let at = |name: &str| directory.path().join(name);
         std::fs::write(at("job"), serde_json::to_vec(job)?)?;
         std::fs::create_dir(at("here"))?;
         let output = std::fs::File::create(at("output"))?;
         let mut command = worker(&at("job"), &self.scratch, kind)?;
-        command.current_dir(at("here")).stdin(Stdio::null()).stdout(output.try_clone()?).stderr(output);
-        let ended = self.wait(&mut command, limit)?;
-        let read =
-            |name: &str| String::from_utf8_lossy(&std::fs::read(at(name)).unwrap_or_default()).into_owned();
-        let ended = ended.map(Ended::from).unwrap_or_default();
-        Ok(Ended { output: read("output"), outcomes: read("outcomes"), inside: true, ..ended })
+        command.current_dir(at("here")).stdout(output.try_clone()?);
+        Ok((directory, command, output))
     }
 
     /// Runs a command in a separate process group for at most `limit` seconds; returns its status, or `None` after the limit.
@@ -185,6 +188,14 @@ impl Workers {
         }
         Ok(ended)
     }
+}
+
+/// Adds the files of a process in this directory to its results.
+fn with_files(ended: Ended, directory: &Path) -> Ended {
+    let read = |name: &str| {
+        String::from_utf8_lossy(&std::fs::read(directory.join(name)).unwrap_or_default()).into_owned()
+    };
+    Ended { output: read("output"), outcomes: read("outcomes"), inside: true, ..ended }
 }
 
 /// Process that forks a child process for each job.

@@ -42,7 +42,7 @@ fn content(step: &Step) -> Option<String> {
         Step::Integrate(_, how) => Some(format!("{how:?}")),
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
         Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Elsewhere(_) => None,
-        Step::Unload | Step::Quit => None,
+        Step::Unload | Step::Quit | Step::Copies(..) => None,
     }
 }
 
@@ -156,7 +156,10 @@ mod tests {
     const WHOLE: &[crate::writer::Part] = &[Begin, ReadAll, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
-        all_steps(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+        all_steps(sequence)
+            .into_iter()
+            .map(|numbered| crate::call_sequence::step_name(&numbered.step))
+            .collect()
     }
 
     fn count(sequence: &CallSequence, name: &str) -> usize {

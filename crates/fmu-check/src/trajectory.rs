@@ -1,9 +1,9 @@
 //! Finds a successful simulation, which most checks vary.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_of};
+use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_name, step_of};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Event, ending, failure, failure_of, step_name};
+use crate::finding::{Event, ending, failure, failure_of};
 use crate::values::input_values;
 use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;

@@ -2,8 +2,8 @@
 
 use super::{Checker, at};
 use crate::always;
-use crate::call_sequence::{CallSequence, End, Run, Setting};
-use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event, step_name};
+use crate::call_sequence::{CallSequence, End, Run, Setting, step_name};
+use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event};
 use crate::rules;
 use crate::writer::{Read, difference};
 use std::sync::Arc;

@@ -4,9 +4,9 @@ mod evaluation;
 mod proofs;
 mod records;
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_of};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_name, step_of};
 use crate::description::Description;
-use crate::finding::{Finding, step_name};
+use crate::finding::Finding;
 use crate::legal::first_illegal;
 use crate::run::{Stop, Workers};
 use crate::worker::interrupted;
@@ -21,8 +21,7 @@ use std::time::{Duration, Instant};
 /// Maximum duration of a quick check in seconds.
 const QUICK: f64 = 30.0;
 
-/// Fraction of the duration that is for the checks. The rest is for shortening call sequences and for the programs that reproduce
-/// the findings.
+/// Fraction of the duration that is for the checks. The rest is for shortening and repeating the call sequences of findings.
 const CHECKS: f64 = 0.8;
 
 /// Returns the step in which the process of a run ended; `None` if its last step returned.
@@ -45,7 +44,7 @@ pub struct Checker {
     pub limit: f64,
     /// Instant after which no check starts a call sequence.
     pub deadline: Instant,
-    /// Instant at which the check ends, including the programs that reproduce the findings.
+    /// Instant at which the check ends, including the repetitions that prove the findings.
     pub end: Instant,
     /// Whether this is a quick check, which tries fewer values and call sequences.
     pub quick: bool,

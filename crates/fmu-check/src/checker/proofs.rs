@@ -1,13 +1,13 @@
-//! Proves findings: shortens the call sequence of a finding, and runs a program in C that reproduces it.
+//! Proves findings: shortens the call sequence of a finding, and executes it twice, each time in new processes.
 
 use super::Checker;
-use crate::call_sequence::{CallSequence, End, Setting};
+use crate::call_sequence::{CallSequence, End, Run, Setting, Step};
+use crate::evidence::Evidence;
 use crate::finding::{Finding, Proof};
-use crate::reproduce::confirm::Proving;
+use crate::reproduce;
 use crate::run::Stop;
 use crate::shrink::shrink;
 use crate::worker::interrupted;
-use std::path::Path;
 use std::time::Instant;
 
 /// For each topic, the functions whose calls are not removed from a call sequence that compares simulations. If only one of two
@@ -50,78 +50,99 @@ impl Checker {
     /// a guard page.
     fn reproducing_setting(&self, finding: &Finding) -> Setting {
         let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
-        Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
+        let now = finding.name == "package.symbols";
+        Setting { soft: self.setting.soft && !ends, now, ..self.setting.clone() }
     }
 
-    /// Shortens the call sequence of a finding, writes the program that reproduces the finding, and runs the program. A finding
-    /// that its program does not show becomes a note. Ends at the instant `until`.
-    pub fn prove(&self, finding: &mut Finding, scratch: &Path, shortens: bool, until: Instant) {
+    /// Shortens the call sequence of a finding, and repeats its calls. A finding that they do not show again becomes a note. Ends
+    /// at the instant `until`.
+    pub fn prove(&self, finding: &mut Finding, shortens: bool, until: Instant) {
         if finding.criterion.is_none() {
             return;
         }
         let begin = Instant::now();
         let (sequence, observed) = (finding.sequence.clone(), finding.observed.clone());
+        finding.steps = (sequence.len(), sequence.len());
         if shortens {
             self.shorten(finding, begin + until.saturating_duration_since(begin) / 2);
         }
-        let mut proof = self.proof(finding, scratch, until);
-        // The program may need a call that was removed, so it is also tried with the original call sequence.
+        let mut proof = self.proof(finding, until);
+        // The finding may need a call that was removed, so the original call sequence is also tried.
         if matches!(proof, Proof::NotShown(_)) && finding.sequence.len() < sequence.len() {
             finding.steps.1 = sequence.len();
             (finding.sequence, finding.observed) = (sequence, observed);
-            proof = self.proof(finding, scratch, until);
+            proof = self.proof(finding, until);
         }
         finding.judge(proof);
     }
 
-    /// Writes the program of a finding, and returns the result of its runs.
-    fn proof(&self, finding: &mut Finding, scratch: &Path, until: Instant) -> Proof {
-        let over =
-            |_| Proof::NotRun(if interrupted() { Stop::Interrupted } else { Stop::TimeOver }.to_string());
-        match self.reproduce(finding, until) {
-            Ok(true) => {}
-            Ok(false) => return Proof::NotShown("a repetition of its calls does not show it".to_owned()),
-            Err(error) => return over(error),
-        }
-        let directory = self.setting.resources.parent().unwrap_or(scratch);
-        let (memory, limit) = (self.setting.memory, self.limit);
-        let proving =
-            Proving { workers: &self.workers, fmu: directory, scratch, memory, limit, deadline: until };
-        proving.prove(finding)
+    /// Repeats the calls of a finding twice, adds them to the finding, and returns whether both repetitions show it.
+    fn proof(&self, finding: &mut Finding, until: Instant) -> Proof {
+        let proof = self.show_twice(finding, until);
+        proof.unwrap_or_else(|error| match error.downcast::<Stop>() {
+            Ok(Stop::TimeOver) if interrupted() => Proof::NotRun(Stop::Interrupted.to_string()),
+            Ok(stop) => Proof::NotRun(stop.to_string()),
+            Err(error) => Proof::NotRun(error.to_string()),
+        })
     }
 
-    /// Repeats the calls of a finding, at most three times. If a repetition shows the finding, writes its program and returns
-    /// true. The limit is ten times as long as in the check, because the machine may be busy; for a hang, it is not extended in
-    /// this way.
-    fn reproduce(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<bool> {
-        let Some(criterion) = finding.criterion.clone() else { return Ok(false) };
+    /// The first repetition must violate the criterion. Its results are the evidence, which the second one must have, too,
+    /// because a later replay has only the evidence.
+    fn show_twice(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<Proof> {
+        let Some(criterion) = finding.criterion.clone() else { return Ok(Proof::Files) };
+        let limit = self.reproducing_limit(finding);
+        let setting = self.reproducing_setting(finding);
+        // The calls are also reported if there is no time to repeat them.
+        reproduce::write(finding, Evidence::Unknown, &setting, limit, &self.description);
+        let first = self.repetition(finding, until, |run| criterion(run).is_some())?;
+        let evidence = first.as_ref().map_or(Evidence::Unknown, |run| reproduce::evidence(finding, run));
+        reproduce::write(finding, evidence.clone(), &setting, limit, &self.description);
+        if first.is_none() {
+            return Ok(Proof::NotShown("a repetition of its calls does not show it".to_owned()));
+        }
+        let second = self.repetition(finding, until, |run| evidence.shows(run, &finding.sequence))?;
+        Ok(match second {
+            Some(_) => Proof::Shown,
+            None => Proof::NotShown("a second repetition of its calls has other results".to_owned()),
+        })
+    }
+
+    /// Returns the maximum duration of a process that reproduces a finding. It is ten times as long as in the check, because the
+    /// machine may be busy; for a hang, it is not extended in this way.
+    fn reproducing_limit(&self, finding: &Finding) -> f64 {
         let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
-        let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
-        for _ in 0..3 {
+        patience * (self.limit + 3.0 * self.setting.repetitions)
+    }
+
+    /// Executes the calls of a finding, and returns the run if it shows the finding. Calls on several threads are executed at most
+    /// three times, because their results may be different each time.
+    fn repetition(
+        &self,
+        finding: &Finding,
+        until: Instant,
+        shows: impl Fn(&Run) -> bool,
+    ) -> anyhow::Result<Option<Run>> {
+        let limit = self.reproducing_limit(finding);
+        let threads = finding.sequence.iter().any(|numbered| matches!(numbered.step, Step::Parallel(_)));
+        for _ in 0..if threads { 3 } else { 1 } {
             let remaining = until.saturating_duration_since(Instant::now()).as_secs_f64();
             if remaining <= 0.0 {
                 return Err(Stop::TimeOver.into());
             }
-            let run = self.workers.execute(
-                &self.reproducing_setting(finding),
-                &finding.sequence,
-                limit.min(remaining),
-            )?;
-            let found = criterion(&run).is_some() || finding.name == "package.symbols";
+            let setting = self.reproducing_setting(finding);
+            let run = self.workers.execute(&setting, &finding.sequence, limit.min(remaining))?;
             if matches!(run.end, End::Hang(seconds) if seconds < limit && !finding.name.ends_with("hang")) {
                 return Err(Stop::TimeOver.into());
             }
-            if found {
-                crate::reproduce::program(finding, &run, &self.setting, &self.description);
-                return Ok(true);
+            if shows(&run) {
+                return Ok(Some(run));
             }
         }
-        Ok(false)
+        Ok(None)
     }
 
     /// Removes calls that the finding does not need, until the instant `until` or the maximum number of attempts.
     fn shorten(&self, finding: &mut Finding, until: Instant) {
-        finding.steps = (finding.sequence.len(), finding.sequence.len());
         let Some(criterion) = finding.criterion.clone() else { return };
         let setting = self.reproducing_setting(finding);
         let hangs = finding.name.ends_with("hang");

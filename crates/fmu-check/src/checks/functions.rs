@@ -18,7 +18,11 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
         checker.workers.execute(&setting, &sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (lazy?.end, immediate?.end) {
-        let criterion = Arc::new(|_: &Run| -> Option<String> { None });
+        // The calls of a finding of this name are repeated with `Setting::now`.
+        let criterion = Arc::new(|run: &Run| match &run.end {
+            End::Unloadable(why) => Some(why.clone()),
+            _ => None,
+        });
         checker.add(checker.broken("package.symbols", why).shown_by(sequence, criterion));
     }
     Ok(())

@@ -3,7 +3,7 @@
 use crate::call_sequence::{End, Measured, Run, Step, Values};
 use crate::checker::Checker;
 use crate::finding::failure;
-use crate::worker::EVALUATED;
+use crate::worker::{EVALUATED, changed_setting, tolerated_growth};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save};
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
@@ -126,32 +126,8 @@ fn check_leaks(
 /// Describes memory that remains after the repetitions.
 fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str) -> Option<String> {
     let grown = after.memory.saturating_sub(before.memory);
-    // The smallest block of glibc is 32 bytes, and glibc may keep a few blocks. If the C library does not report the allocated
-    // memory, the resident memory is measured, which consists of pages.
-    let allowed = if before.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
-    (grown > allowed)
+    (grown > tolerated_growth(&before, times))
         .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
-}
-
-/// Setting that may differ while an instance exists, because the instance may have files in the working directory.
-const FILES: &str = "files in the working directory";
-
-/// Describes the first setting that differs between two measurements. Settings that begin with `ignored` are not compared. If `ignored` is
-/// empty, all settings are compared.
-fn changed(before: &Measured, after: &Measured, ignored: &str) -> Option<String> {
-    let only_in = |one: &Measured, other: &Measured| {
-        let is_other = |setting: &&String| {
-            !other.settings.contains(setting) && (ignored.is_empty() || !setting.starts_with(ignored))
-        };
-        one.settings.iter().find(is_other).cloned()
-    };
-    // A setting may be missing in one measurement, because the number of environment variables may change.
-    match (only_in(before, after), only_in(after, before)) {
-        (None, None) => None,
-        (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
-        (Some(was), None) => Some(format!("{was} is gone")),
-        (None, Some(is)) => Some(format!("{is} is new")),
-    }
 }
 
 /// Checks that a simulation changes no settings of the process, and that nothing is printed until the library is unloaded.
@@ -167,8 +143,8 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
         let measured = |id| run.outcome(id)?.measured.as_ref();
         let before = measured(first)?;
-        let while_alive = measured(alive).and_then(|alive| changed(before, alive, FILES));
-        while_alive.or_else(|| changed(before, measured(freed)?, ""))
+        let while_alive = measured(alive).and_then(|alive| changed_setting(before, alive, false));
+        while_alive.or_else(|| changed_setting(before, measured(freed)?, true))
     })?;
     checker.record("logs.printed", &run, &writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;

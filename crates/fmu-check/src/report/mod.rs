@@ -13,6 +13,9 @@ use fmi_abi::{one_line, shown, shown_to};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Version of the format of the report.
+pub const SCHEMA: u32 = 2;
+
 /// Report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
@@ -56,7 +59,7 @@ pub struct Report {
 impl Report {
     pub(crate) fn new(path: &Path, checker: &Checker, findings: Vec<Finding>) -> Self {
         Self {
-            schema: 1,
+            schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             status: 0,
             unused: Vec::new(),
@@ -237,7 +240,7 @@ impl Report {
         )
     }
 
-    /// Writes the reports as files to a directory, and for each finding the C program that should reproduce it, if there is one.
+    /// Writes the reports as files to a directory.
     ///
     /// # Errors
     /// Fails if a file cannot be written.
@@ -247,9 +250,6 @@ impl Report {
         std::fs::write(directory.join("junit.xml"), self.junit())?;
         std::fs::write(directory.join("report.sarif"), serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
         std::fs::write(directory.join("report.html"), page::page(self))?;
-        for finding in self.findings.iter().filter(|finding| !finding.c.is_empty()) {
-            std::fs::write(directory.join(format!("{}.c", finding.name)), &finding.c)?;
-        }
         Ok(())
     }
 }

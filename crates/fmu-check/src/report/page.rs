@@ -1,12 +1,63 @@
 //! Report as an HTML page that needs no other files.
 
 use super::Report;
-use crate::finding::{Proof, Severity};
+use crate::finding::{Finding, Proof, Severity};
 use std::fmt::Write as _;
 
 /// Escapes a string for XML and HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Returns the calls of the finding with this number, and the results that show it; empty if there are none.
+fn calls(number: usize, finding: &Finding) -> String {
+    if finding.calls.is_empty() {
+        return String::new();
+    }
+    let lines = |lines: &[String]| escape(&lines.join("\n"));
+    let expected = match &finding.expected[..] {
+        [] => String::new(),
+        list => format!("<p>The finding shows if all of this holds:</p><pre>{}</pre>\n", lines(list)),
+    };
+    format!(
+        "<details><summary>{} calls</summary><pre>{}</pre>\n{expected}\
+         <p>To repeat the calls: <code>fmu-check replay report.json {number}</code></p></details>\n",
+        finding.steps.1,
+        lines(&finding.calls)
+    )
+}
+
+/// Returns the section of the finding with this number.
+fn section(number: usize, finding: &Finding) -> String {
+    let mut text = String::new();
+    let name = finding.severity.name();
+    let _ = write!(
+        text,
+        "<section class=\"{name}\"><span class=\"severity\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>Rule: {}</p>\n<p>{}</p>\n",
+        finding.name,
+        escape(&finding.observed),
+        escape(&finding.requirement),
+        if finding.section.is_empty() { "Not in the standard" } else { &finding.section }
+    );
+    if let Some(cause) = &finding.cause {
+        let _ = writeln!(text, "<p>It may follow from {cause}, which should be fixed first.</p>");
+    }
+    if let Proof::NotShown(why) | Proof::NotRun(why) = &finding.proof {
+        let _ = writeln!(text, "<p>Not reproduced: {}.</p>", escape(why));
+    }
+    if let Some(reason) = &finding.accepted {
+        let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
+    }
+    if !finding.more.is_empty() {
+        let _ = writeln!(text, "<details><summary>{} more</summary><ul>", finding.more.len());
+        for more in &finding.more {
+            let _ = writeln!(text, "<li>{}</li>", escape(more));
+        }
+        text.push_str("</ul></details>\n");
+    }
+    text.push_str(&calls(number, finding));
+    text.push_str("</section>\n");
+    text
 }
 
 /// Returns the page.
@@ -20,50 +71,17 @@ pub fn page(report: &Report) -> String {
         ),
         (
             Severity::Note,
-            "Note: importers work nevertheless, or the program of the finding does not show it.",
+            "Note: importers work nevertheless, or the calls of the finding do not show it again.",
         ),
     ] {
         let findings: Vec<_> =
-            report.findings.iter().filter(|finding| finding.severity == severity).collect();
+            (1..).zip(&report.findings).filter(|(_, finding)| finding.severity == severity).collect();
         if findings.is_empty() {
             continue;
         }
         let _ = writeln!(text, "<p><em>{what}</em></p>");
-        for finding in findings {
-            let name = severity.name();
-            let _ = write!(
-                text,
-                "<section class=\"{name}\"><span class=\"severity\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>Rule: {}</p>\n<p>{}</p>\n",
-                finding.name,
-                escape(&finding.observed),
-                escape(&finding.requirement),
-                if finding.section.is_empty() { "Not in the standard" } else { &finding.section }
-            );
-            if let Some(cause) = &finding.cause {
-                let _ = writeln!(text, "<p>It may follow from {cause}, which should be fixed first.</p>");
-            }
-            if let Proof::NotShown(why) | Proof::NotRun(why) = &finding.proof {
-                let _ = writeln!(text, "<p>Not reproduced: {}.</p>", escape(why));
-            }
-            if let Some(reason) = &finding.accepted {
-                let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
-            }
-            if !finding.more.is_empty() {
-                let _ = writeln!(text, "<details><summary>{} more</summary><ul>", finding.more.len());
-                for more in &finding.more {
-                    let _ = writeln!(text, "<li>{}</li>", escape(more));
-                }
-                text.push_str("</ul></details>\n");
-            }
-            if !finding.c.is_empty() {
-                let _ = writeln!(
-                    text,
-                    "<details><summary>Program in C for this finding, with {} calls</summary><pre>{}</pre></details>",
-                    finding.steps.1,
-                    escape(&finding.c)
-                );
-            }
-            text.push_str("</section>\n");
+        for (number, finding) in findings {
+            text.push_str(&section(number, finding));
         }
     }
     if report.findings.is_empty() {

@@ -1,67 +1,21 @@
-//! Chooses the results that the program of a finding compares: the results that the criterion needs to detect the violation.
+//! Finds the evidence of a finding: the results that its criterion needs to detect the violation.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Values};
+use crate::call_sequence::{End, Outcome, Run, Values};
+use crate::evidence::{Evidence, Expected, Measure, corresponding_reads, end_name};
 use crate::finding::{Finding, SharedCriterion};
-use std::fmt::Write as _;
-
-/// Comparison by which a program decides whether it reproduces the finding.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Evidence {
-    /// No comparison is known.
-    #[default]
-    None,
-    /// Crash, hang or exit, or a library that cannot be loaded.
-    End,
-    /// Processes that are alive after the end of the call sequence, or too many processes before its end.
-    Orphans,
-    /// Output on the standard output or the standard error.
-    Printed,
-    /// Writes outside of the arrays for results.
-    Damage,
-    /// Messages with an environment pointer other than the one of the program.
-    Strays,
-    /// Pairs of calls. The results of at least one pair differ.
-    Differ(Vec<[u32; 2]>),
-    /// Calls that all have the expected results, and pairs of calls that all have different values.
-    Same(Vec<Expected>, Vec<[u32; 2]>),
-    /// Quantity, the numbers of two steps that measure it, and a limit. The quantity grows by more than the limit; settings only
-    /// have to differ.
-    Grown(Measure, u32, u32, u64),
-}
-
-/// Maximum number of repetitions in a program.
-const REPETITIONS: usize = 500;
+use crate::worker::changed_setting;
 
 /// Maximum number of calls that are searched for pairs.
 const MOST_COMPARED: usize = 12;
 
-/// Quantity of a measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Measure {
-    Memory,
-    Threads,
-    Files,
-    Settings,
-}
-
-/// Expected results of a call.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Expected {
-    pub id: u32,
-    /// Whether the values that the call wrote are compared, and whether its messages are.
-    pub matters: [bool; 2],
-    /// Results of the run, in the format of the programs.
-    pub observed: String,
-}
-
-/// Returns the comparison for a finding, from a run of its call sequence.
+/// Returns the evidence of a finding from a run of its call sequence that violates its criterion.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
-    let Some(criterion) = &finding.criterion else { return Evidence::None };
+    let Some(criterion) = &finding.criterion else { return Evidence::Unknown };
     if matches!(run.end, End::Flood(_)) {
         return Evidence::Orphans;
     }
-    if run.end != End::Done || finding.name == "package.symbols" {
-        return Evidence::End;
+    if run.end != End::Done {
+        return Evidence::End(run.end.clone(), end_name(run, &finding.sequence));
     }
     let without = |change: &dyn Fn(&mut Run)| {
         let mut changed = run.clone();
@@ -80,32 +34,35 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.strays.clear())) {
         return Evidence::Strays;
     }
-    let pairs = pairs(&finding.sequence);
-    if !pairs.is_empty() {
-        return Evidence::Differ(pairs);
+    if !corresponding_reads(&finding.sequence).is_empty() {
+        return Evidence::Threads;
     }
     let needed = needed(criterion, run);
-    let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
-    if needed.outcomes.values().any(|outcome| measured(&outcome)) {
+    let measured = |outcome: &Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
+    if needed.outcomes.values().any(measured) {
         return grown(finding, &needed);
     }
-    let calls = needed.outcomes.values().filter(|outcome| outcome.measured.is_none());
-    let mut ids: Vec<u32> = calls.map(|outcome| outcome.id).collect();
-    ids.sort_unstable();
-    let expected: Vec<Expected> = ids.iter().map(|id| expected_result(criterion, &needed, *id)).collect();
-    let unequal = unequal(criterion, &needed, &expected);
-    match &expected[..] {
-        [] => Evidence::None,
-        _ => Evidence::Same(expected, unequal),
+    let mut calls: Vec<&Outcome> =
+        needed.outcomes.values().filter(|outcome| outcome.measured.is_none()).collect();
+    calls.sort_unstable_by_key(|outcome| outcome.id);
+    if calls.is_empty() {
+        return Evidence::Unknown;
     }
+    let mut expected: Vec<Expected> =
+        calls.into_iter().map(|outcome| expected_result(criterion, &needed, outcome)).collect();
+    let pairs = unequal(criterion, &needed, &expected);
+    for call in expected.iter_mut().filter(|call| pairs.iter().any(|pair| pair.contains(&call.id))) {
+        (call.written, call.log) = (None, None);
+    }
+    Evidence::Same(expected, pairs)
 }
 
-/// Returns the pairs of calls whose values only have to differ, because the criterion is fulfilled if they are equal. The program
-/// does not compare them with the values of this run, because they may be different in every run.
+/// Returns the pairs of calls whose values only have to differ, because the criterion is fulfilled if they are equal. They are not
+/// compared with the values of this run, because they may be different in every run.
 fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec<[u32; 2]> {
     let compared: Vec<&Outcome> = expected
         .iter()
-        .filter(|result| result.matters[0])
+        .filter(|result| result.written.is_some())
         .filter_map(|result| run.outcome(result.id))
         .collect();
     let equalized = |from: &Outcome, to: &Outcome| {
@@ -138,33 +95,6 @@ fn alike(one: &Outcome, other: &Outcome) -> bool {
     one.written != other.written && shape(one) == shape(other)
 }
 
-/// Pairs each read on a thread with the corresponding read before the threads: of the same instance if it was simulated before,
-/// otherwise of any instance. Which pairs differ may change from run to run.
-fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
-    let queries = |sequence: &[Numbered]| -> Vec<(Option<usize>, u32)> {
-        let query = |numbered: &Numbered| match &numbered.step {
-            Step::Call { function, instance, .. } if function[4..].starts_with("Get") => {
-                Some((*instance, numbered.id))
-            }
-            _ => None,
-        };
-        sequence.iter().filter_map(query).collect()
-    };
-    let single = queries(sequence);
-    let mut pairs = Vec::new();
-    for numbered in sequence {
-        let Step::Parallel(sequences) = &numbered.step else { continue };
-        for reads in sequences.iter().map(|sequence| queries(sequence)) {
-            let own =
-                single.iter().filter(|(of, _)| reads.first().is_some_and(|(instance, _)| of == instance));
-            let own: Vec<_> = own.collect();
-            let all: Vec<_> = if own.is_empty() { single.iter().collect() } else { own };
-            pairs.extend(reads.iter().zip(all.into_iter().cycle()).map(|((_, id), (_, one))| [*one, *id]));
-        }
-    }
-    pairs
-}
-
 /// Returns the run without the outcomes that the criterion does not need.
 fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     let mut needed = run.clone();
@@ -184,105 +114,48 @@ fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
     needed
 }
 
-/// Returns the expected results of a call: the parts of its outcome that the criterion needs.
-fn expected_result(criterion: &SharedCriterion, run: &Run, id: u32) -> Expected {
+/// Returns the expected results of a call: the parts of its outcome that the criterion needs. Values and messages are left out if
+/// the values only have to differ from the values of another call.
+fn expected_result(criterion: &SharedCriterion, run: &Run, outcome: &Outcome) -> Expected {
     let without = |change: &dyn Fn(&mut Outcome)| {
         let mut changed = run.clone();
-        changed.outcomes.entry(id).and_modify(change);
+        changed.outcomes.entry(outcome.id).and_modify(change);
         criterion(&changed).is_none()
     };
-    let matters = [
-        without(&|outcome| outcome.written.clear())
-            || run.outcome(id).is_some_and(|outcome| outcome.text.is_some()),
-        without(&|outcome| outcome.log.clear())
-            || run.outcome(id).is_some_and(|outcome| outcome.log.is_empty() && outcome.status > Some(1)),
-    ];
+    let written = without(&|outcome| outcome.written.clear());
+    let log = without(&|outcome| outcome.log.clear()) || outcome.log.is_empty() && outcome.status > Some(1);
     Expected {
-        id,
-        matters,
-        observed: run.outcome(id).map_or(String::new(), |outcome| shown(outcome, matters)),
+        id: outcome.id,
+        status: outcome.status,
+        missing: outcome.missing,
+        written: written.then(|| outcome.written.clone()),
+        log: log.then(|| outcome.log.clone()),
+        text: outcome.text.clone(),
     }
 }
 
-/// Returns bytes as hexadecimal digits.
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}
-
-/// Formats the results of a call in the same way as the programs.
-fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
-    let mut text = String::new();
-    let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
-    if let Some(number) = outcome.status {
-        let _ = write!(text, "{number};");
-    }
-    for array in outcome.written.iter().filter(|_| written) {
-        match array {
-            Values::Numbers(kind, bits) => {
-                for bits in bits {
-                    let mask = u64::MAX >> (64 - 8 * kind.size());
-                    let _ = write!(text, "{:x},", bits & mask);
-                }
-            }
-            Values::Strings(texts) => texts.iter().for_each(|string| {
-                let _ = write!(text, "{},", or_null(string));
-            }),
-        }
-        text.push(';');
-    }
-    if let Some(version) = outcome.text.as_ref().filter(|_| written) {
-        let _ = write!(text, "{},;", hex(version));
-    }
-    for message in outcome.log.iter().filter(|_| log) {
-        let _ = write!(text, "{} {} {};", message.status, or_null(&message.category), or_null(&message.text));
-    }
-    text
-}
-
-/// Returns the comparison of two measurements.
+/// Returns the comparison of the two measurements that the criterion needs.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
-    let mut ids: Vec<(u32, bool)> = needed
-        .outcomes
-        .values()
-        .filter_map(|outcome| Some((outcome.id, outcome.measured.as_ref()?.times > 0)))
-        .collect();
-    ids.sort_unstable();
-    let times = ids.iter().rev().find(|(_, repeated)| *repeated);
-    let times = times
-        .and_then(|(id, _)| needed.outcome(*id)?.measured.as_ref())
-        .map_or(0, |outcome| outcome.times.min(REPETITIONS) as u64);
-    let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
-    let known = [
-        ("resources.memory", Measure::Memory, 16 * times + 4096),
-        ("resources.threads", Measure::Threads, 2),
-        ("resources.files", Measure::Files, 2),
-        ("resources.settings", Measure::Settings, 0),
-    ];
-    match (&measures[..], known.into_iter().find(|(name, ..)| *name == finding.name)) {
-        (&[first, last], Some((_, measure, limit))) => Evidence::Grown(measure, first, last, limit),
-        _ => Evidence::None,
-    }
-}
-
-/// Returns the sequence with as many repetitions as in a run, but at most `REPETITIONS`.
-pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
-    let mut sequence = sequence.clone();
-    for numbered in &mut sequence {
-        if let (Step::Repeat(times, _), Some(measured)) =
-            (&mut numbered.step, run.outcome(numbered.id).and_then(|outcome| outcome.measured.as_ref()))
-        {
-            *times = measured.times.min(REPETITIONS);
-        }
-    }
-    sequence
+    let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
+    let mut measurements: Vec<&Outcome> = needed.outcomes.values().filter(measured).collect();
+    measurements.sort_unstable_by_key(|outcome| outcome.id);
+    let [first, last] = measurements[..] else { return Evidence::Unknown };
+    let changed = first.measured.as_ref().zip(last.measured.as_ref());
+    let changed = changed.is_some_and(|(first, last)| changed_setting(first, last, false).is_some());
+    let measure = match finding.name.as_str() {
+        "resources.memory" => Measure::Memory,
+        "resources.threads" => Measure::Threads,
+        "resources.files" => Measure::Files,
+        "resources.settings" if changed => Measure::Settings,
+        "resources.settings" => Measure::AllSettings,
+        _ => return Evidence::Unknown,
+    };
+    Evidence::Grown(measure, first.id, last.id)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Evidence, evidence};
+    use super::{Evidence, Expected, evidence};
     use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Values};
     use crate::finding::{Finding, SharedCriterion};
     use std::sync::Arc;
@@ -320,10 +193,17 @@ mod tests {
             let (one, other) = (run.written(1)?, run.written(3)?);
             one.differ(other).map(|_| "they differ".to_owned())
         });
-        let Evidence::Same(_, pairs) = evidence(&finding(criterion), &run()) else {
-            panic!("the evidence has no calls")
+        let finding = finding(criterion);
+        let found = evidence(&finding, &run());
+        let Evidence::Same(_, pairs) = &found else { panic!("the evidence has no calls") };
+        assert_eq!(*pairs, [[1, 3]]);
+        let other = |of_second: u32| {
+            let mut run = run();
+            let written = run.outcome(of_second).map(|outcome| outcome.written.clone()).unwrap_or_default();
+            run.outcomes.entry(3).and_modify(|outcome| outcome.written = written);
+            run
         };
-        assert_eq!(pairs, [[1, 3]]);
+        assert!(found.shows(&other(2), &finding.sequence) && !found.shows(&other(1), &finding.sequence));
     }
 
     #[test]
@@ -333,7 +213,7 @@ mod tests {
         let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else {
             panic!("the evidence has no calls")
         };
-        assert_eq!(expected.iter().map(|result| result.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
+        assert_eq!(expected, [Expected { id: 2, status: Some(3), ..Expected::default() }]);
     }
 
     #[test]
@@ -343,7 +223,11 @@ mod tests {
         let Evidence::Same(expected, _) = evidence(&finding(criterion), &run()) else {
             panic!("the evidence has no calls")
         };
-        assert_eq!(expected[0].observed, "3;3 - 6e6f;");
+        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()) };
+        assert_eq!(
+            expected,
+            [Expected { id: 2, status: Some(3), log: Some(vec![message]), ..Expected::default() }]
+        );
     }
 
     #[test]
@@ -351,7 +235,8 @@ mod tests {
         let criterion: SharedCriterion =
             Arc::new(|run| (run.end != End::Done).then(|| "it crashes".to_owned()));
         let crashed = Run { end: End::Crash(String::new()), ..run() };
-        assert_eq!(evidence(&finding(criterion), &crashed), Evidence::End);
+        let expected = Evidence::End(crashed.end.clone(), None);
+        assert_eq!(evidence(&finding(criterion), &crashed), expected);
         let orphans: SharedCriterion = Arc::new(|run| run.orphans.first().cloned());
         let run = Run { orphans: vec!["sleep".to_owned()], ..run() };
         assert_eq!(evidence(&finding(orphans), &run), Evidence::Orphans);

@@ -1,16 +1,28 @@
-//! Programs in C that reproduce a finding without fmu-check.
+//! Writes the calls of a finding for reports: as text, and so that they can be executed again without the check.
 
-mod c;
-pub mod confirm;
 mod evidence;
+mod text;
 
-use crate::call_sequence::{Run, Setting};
+pub use evidence::evidence;
+pub use text::{Printed, expectation};
+
+use crate::call_sequence::{Setting, fold};
 use crate::description::Description;
+use crate::evidence::{Evidence, Replay};
 use crate::finding::Finding;
 
-/// Writes the program that reproduces a finding. The program compares its results with the results of `run`.
-pub fn program(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
-    let evidence = evidence::evidence(finding, run);
-    let sequence = evidence::as_repeated(&finding.sequence, run);
-    finding.c = c::program(finding, &sequence, &evidence, setting, description);
+/// Adds the calls and the expected results to a finding. `limit` is the maximum duration of a process in seconds.
+pub fn write(
+    finding: &mut Finding,
+    evidence: Evidence,
+    setting: &Setting,
+    limit: f64,
+    description: &Description,
+) {
+    let sequence = fold(&finding.sequence);
+    let printed = Printed { description, run: None };
+    finding.calls = printed.lines(&sequence);
+    finding.expected = expectation(&evidence, &finding.sequence, None);
+    let Setting { soft, now, memory, repetitions, .. } = *setting;
+    finding.replay = Some(Replay { soft, now, memory, repetitions, limit, evidence, sequence });
 }

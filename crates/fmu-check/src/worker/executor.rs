@@ -52,6 +52,8 @@ pub struct Executor {
     pub sizes: Mutex<HashMap<usize, usize>>,
     /// File for the outcomes of the steps.
     pub file: Mutex<File>,
+    /// Number of the step before which this process waits for a debugger.
+    pub stop_before: Option<u32>,
 }
 
 unsafe extern "C" {

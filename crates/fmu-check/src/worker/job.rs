@@ -28,16 +28,8 @@ pub struct Job {
     pub sequence: CallSequence,
     /// Serialized states of earlier processes of the call sequence, by index.
     pub bytes: HashMap<usize, Vec<u8>>,
-}
-
-/// Program that is run instead of a call sequence, with the directory of the FMU as its argument.
-#[cfg(target_os = "linux")]
-#[derive(Serialize, Deserialize)]
-pub struct Program {
-    pub program: std::path::PathBuf,
-    pub fmu: std::path::PathBuf,
-    /// Maximum address space of its processes in bytes.
-    pub memory: u64,
+    /// Number of the step before which the process waits for a debugger.
+    pub stop_before: Option<u32>,
 }
 
 /// Results of a process. A process that was ended because it exceeded a limit has neither an exit status nor a signal.

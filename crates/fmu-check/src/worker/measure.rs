@@ -1,4 +1,4 @@
-//! Measures the resources and settings of the process.
+//! Measures the resources and settings of the process, and compares measurements.
 
 use super::settings::settings;
 use crate::call_sequence::Measured;
@@ -31,4 +31,31 @@ fn memory() -> (u64, bool) {
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
     (pages * 4096, false)
+}
+
+/// Returns the number of bytes by which the memory may grow during these repetitions. The smallest block of glibc is 32 bytes, and
+/// glibc may keep a few blocks. If the C library does not report the allocated memory, the resident memory is measured, which
+/// consists of pages.
+pub fn tolerated_growth(before: &Measured, times: usize) -> u64 {
+    if before.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) }
+}
+
+/// Setting that may differ while an instance exists, because the instance may have files in the working directory.
+const FILES: &str = "files in the working directory";
+
+/// Describes the first setting that differs between two measurements; the files in the working directory are compared only if
+/// `files` is set.
+pub fn changed_setting(before: &Measured, after: &Measured, files: bool) -> Option<String> {
+    let only_in = |one: &Measured, other: &Measured| {
+        let is_other =
+            |setting: &&String| !other.settings.contains(setting) && (files || !setting.starts_with(FILES));
+        one.settings.iter().find(is_other).cloned()
+    };
+    // A setting may be missing in one measurement, because the number of environment variables may change.
+    match (only_in(before, after), only_in(after, before)) {
+        (None, None) => None,
+        (Some(was), Some(is)) => Some(format!("{was} has become {is}")),
+        (Some(was), None) => Some(format!("{was} is gone")),
+        (None, Some(is)) => Some(format!("{is} is new")),
+    }
 }

@@ -21,9 +21,8 @@ pub use contain::end_group;
 #[cfg(target_os = "linux")]
 pub use contain::readable;
 pub use contain::{interrupted, listen_for_interrupts};
-#[cfg(target_os = "linux")]
-pub use job::Program;
 pub use job::{EVALUATED, EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE};
+pub use measure::{changed_setting, tolerated_growth};
 pub use memory::FILL;
 use std::fs::File;
 use std::path::Path;

@@ -2,12 +2,12 @@
 //! fork. The server adopts and ends the orphaned processes of a call sequence.
 
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
-use super::job::{Ended, Program, SCRATCH, VARIABLE};
+use super::job::{Ended, SCRATCH};
 use super::memory::calls_in_progress;
-use super::work::{end, limit, work};
+use super::work::{end, work};
 use std::fs::File;
 use std::io::{Read as _, Seek as _, Write as _};
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::ExitStatus;
 use std::sync::atomic::Ordering;
@@ -74,14 +74,6 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
         unsafe { libc::dup2(file.as_raw_fd(), number) };
     }
     drop((nothing, output));
-    if let Ok(Program { program, fmu, memory }) = serde_json::from_str(job) {
-        limit(memory);
-        let mut command = std::process::Command::new(program);
-        // The program writes its files to the directory of this server, which is cleared after each job.
-        let here = std::env::current_dir().unwrap_or_default();
-        command.arg(fmu).env("TMPDIR", here).env_remove(VARIABLE).env_remove(SCRATCH);
-        end(Err(command.exec().to_string()));
-    }
     let read = serde_json::from_str(job).map_err(|error| error.to_string());
     end(read.map(|job| work(job, outcomes)))
 }

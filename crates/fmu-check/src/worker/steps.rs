@@ -4,8 +4,9 @@ use super::executor::{Executor, Instance, THREADS};
 use super::job::{EVALUATED, EXECUTED, Last};
 use super::logger::{messages, text_at};
 use super::memory::{self, in_fmu};
+use super::work::wait_for_debugger;
 use super::{integrate, locked, measure};
-use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step};
+use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step, step_name};
 use fmi_abi::c_types::{c_char, c_void};
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
@@ -18,6 +19,9 @@ impl Executor {
         let mut outcomes = Vec::new();
         for numbered in sequence {
             let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
+            if report && self.stop_before == Some(numbered.id) {
+                wait_for_debugger(&step_name(&numbered.step));
+            }
             match &numbered.step {
                 Step::Repeat(times, steps) => {
                     let begin = Instant::now();
@@ -125,7 +129,11 @@ impl Executor {
                 self.write(&Last { bytes: HashMap::new() });
                 in_fmu(|| std::process::exit(EXECUTED))
             }
-            Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess | Step::Elsewhere(_) => {}
+            Step::Repeat(..)
+            | Step::Parallel(_)
+            | Step::FreshProcess
+            | Step::Elsewhere(_)
+            | Step::Copies(..) => {}
         }
     }
 }

@@ -48,6 +48,7 @@ pub fn work(job: Job, file: File) {
         bytes: Mutex::new(job.bytes),
         sizes: Mutex::default(),
         file: Mutex::new(file),
+        stop_before: job.stop_before,
     };
     executor.execute(&job.sequence, true);
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
@@ -71,9 +72,23 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
     }
 }
 
+/// Waits until a line is entered, so that a debugger can be attached to this process before its next call.
+pub fn wait_for_debugger(next: &str) {
+    // Some Linux systems allow only the ancestors of a process to debug it. SAFETY: the call takes only numbers.
+    #[cfg(target_os = "linux")]
+    unsafe {
+        libc::prctl(libc::PR_SET_PTRACER, libc::PR_SET_PTRACER_ANY);
+    }
+    let (debugger, id) = (if cfg!(target_os = "macos") { "lldb" } else { "gdb" }, std::process::id());
+    eprintln!("Process {id} waits before {next}. Attach a debugger: {debugger} -p {id}");
+    eprintln!("Set breakpoints and continue in the debugger, then press Enter here.");
+    // If the input is closed, the process continues at once.
+    let _ = std::io::stdin().read_line(&mut String::new());
+}
+
 /// Limits the size of files of this process on Unix. On Linux, also limits its memory and makes the kernel end it
 /// when its parent process ends.
-pub fn limit(memory: u64) {
+fn limit(memory: u64) {
     #[cfg(unix)]
     {
         let set = |what, value| {

@@ -25,13 +25,13 @@ fn findings(fmi: u32, faults: &str, topics: &str) -> Vec<Value> {
     let mut findings = report["findings"].as_array().expect("a list").clone();
     // The first depends on the system; the second is expected, because the FMU logs nothing.
     findings.retain(|finding| finding["name"] != "package.glibc" && finding["name"] != "logs.silent");
-    // The programs are so long that failure messages would be unreadable.
-    findings.iter_mut().for_each(|finding| finding["c"] = Value::Null);
+    // The calls are so many that failure messages would be unreadable.
+    findings.iter_mut().for_each(|finding| finding["replay"] = Value::Null);
     findings
 }
 
 /// Asserts that each of the faults is found. `expected` has the fault, the name of the rule, and a part of an observation for
-/// each. The program of the finding must show it, too.
+/// each. The calls of the finding must show it again.
 fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
     let faults: Vec<&str> = expected.iter().map(|(fault, ..)| *fault).collect();
     let findings = findings(fmi, &faults.join(","), topics);

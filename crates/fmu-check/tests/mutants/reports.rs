@@ -1,6 +1,7 @@
 //! Reports, options and exit statuses of checks.
 
-use super::wagon::{UNLIMITED, check, fmu, found, library, not_shown_without_fault, unpack};
+use super::wagon::{UNLIMITED, check, fmu, found, library, not_shown_without_fault, replay};
+use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
@@ -85,7 +86,7 @@ fn a_baseline_accepts_with_a_reason() {
         );
         assert_eq!(result["suppressions"].is_array(), status == 0, "{line}");
         let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
-        assert_eq!((&report["schema"], &report["status"]), (&1.into(), &status.into()));
+        assert_eq!((&report["schema"], &report["status"]), (&2.into(), &status.into()));
         assert_eq!(String::from_utf8_lossy(&output.stdout).contains("1 accepted"), status == 0);
     }
 }
@@ -168,28 +169,31 @@ fn drafts_are_not_checked() {
     assert_eq!(output.status.code(), Some(2));
 }
 
-/// Asserts that the README shows the beginning of the output of this check, in which the wagon rejects the step to the stop time.
+/// Asserts that the README shows the beginning of the output of this check, in which the wagon rejects the step to the stop time, and
+/// the output of a replay.
 #[test]
 fn the_readme_shows_real_output() {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
-    let mut command = check(&path);
-    command.args(UNLIMITED).args(["--only", "life_cycle"]).env("WAGON_FAULT", "last_step_rejected");
+    let mut command = check(Path::new(path.file_name().expect("a name")));
+    command.args(UNLIMITED).args(["--only", "life_cycle", "--out", "report"]);
+    command.current_dir(&directory).env("WAGON_FAULT", "last_step_rejected");
     let output = command.output().expect("runs");
-    let output = String::from_utf8_lossy(&output.stdout).replace(&*directory.path().to_string_lossy(), "");
-    let printed: String = output
-        .lines()
-        .take_while(|line| !line.starts_with("not checked"))
-        .map(|line| format!("{}\n", line.trim_start_matches('/').trim_end()))
-        .collect();
+    let output = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lines = output.lines().take_while(|line| !line.starts_with("not checked"));
+    let printed: String = lines.map(|line| format!("{}\n", line.trim_end())).collect();
     let readme = include_str!("../../README.md");
     assert!(printed.lines().count() == 3 && readme.contains(&printed), "{printed}");
+    let mut command = replay(Path::new("report"), "1", &[]);
+    let output = command.current_dir(&directory).env("WAGON_FAULT", "last_step_rejected").output();
+    let printed = String::from_utf8_lossy(&output.expect("runs").stdout).into_owned();
+    assert!(printed.contains("The finding shows.") && readme.contains(&printed), "{printed}");
 }
 
-/// Asserts that a shortened call sequence has few calls, that the reports contain the finding, and that its program does not show
-/// it in the FMU without the fault.
+/// Asserts that a shortened call sequence has few calls, that the reports contain the finding, and that a replay of its calls shows
+/// it with the fault each time, also after it has waited for a debugger, but not in the FMU without the fault.
 #[test]
-fn programs_show_it() {
+fn calls_show_it() {
     let directory = TempDir::new().expect("a directory");
     for (mutant, topic, name, most) in [
         ("lossy_state", "states", "states.restore-values", 14),
@@ -207,8 +211,53 @@ fn programs_show_it() {
         for file in ["report.html", "report.json", "junit.xml"] {
             assert!(std::fs::read_to_string(out.join(file)).expect(file).contains(name), "{file}");
         }
-        let unpacked = directory.path().join("unpacked");
-        unpack(&path, &unpacked);
-        not_shown_without_fault(&out, name, &unpacked, mutant);
+        not_shown_without_fault(&out, name, &path, mutant);
+        let shown = |options: &[&str]| {
+            let output = replay(&out, name, options).env("WAGON_FAULT", mutant).output().expect("runs");
+            assert_eq!(output.status.code(), Some(1), "{mutant}: {output:?}");
+            [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned())
+        };
+        let [printed, _] = shown(&["--times", "2"]);
+        assert!(
+            printed.contains("Repetition 2: shown") && printed.contains(" c = fmi2Instantiate("),
+            "{printed}"
+        );
+        let last = report["findings"][0]["calls"].as_array().and_then(|calls| calls.last()?.as_str());
+        assert!(last.is_some_and(|last| printed.contains(last)), "{printed}");
+        let [_, waits] = shown(&["--break"]);
+        assert!(waits.contains(" waits before ") && waits.contains(" -p "), "{waits}");
     }
+    // An FMU without these calls must not seem to have no fault.
+    let elsewhere = |text: String| {
+        text.replace("<CoSimulation modelIdentifier=\"wagon", "<CoSimulation modelIdentifier=\"cart")
+    };
+    for (fmi, why) in [(2, "there is no cart"), (3, "is not a call of FMI 3.0")] {
+        let other = TempDir::new().expect("a directory");
+        let path = fmu(other.path(), fmi, &library(fmi, ""), elsewhere);
+        let options = ["--fmu", &path.to_string_lossy()];
+        let output = replay(&directory.path().join("out"), "1", &options).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && text.contains(why), "{text}");
+    }
+}
+
+/// Asserts that a replay fails with a message if the report has no such finding, if it has no calls, or if it is from another
+/// version.
+#[test]
+fn a_replay_states_why_it_is_not_possible() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| text.replace("UTF-8", "ISO-8859-1"));
+    let out = directory.path().join("out");
+    found(&path, "none", &["--only", "description", "--out", &out.to_string_lossy()]);
+    let report = std::fs::read_to_string(out.join("report.json")).expect("the report");
+    let fails = |finding: &str, why: &str| {
+        let output = replay(&out, finding, &[]).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && text.contains(why), "{text}");
+    };
+    fails("7", "its findings are description.encoding");
+    fails("1", "concerns the files of the FMU");
+    std::fs::write(out.join("report.json"), report.replace("\"schema\": 2", "\"schema\": 1"))
+        .expect("a file");
+    fails("1", "its schema is 1");
 }

@@ -29,12 +29,6 @@ pub fn check(fmu: &Path) -> Command {
     command
 }
 
-/// Unpacks an FMU.
-pub fn unpack(fmu: &Path, directory: &Path) {
-    let file = std::fs::File::open(fmu).expect("the FMU");
-    zip::ZipArchive::new(file).expect("a ZIP").extract(directory).expect("a directory");
-}
-
 /// Checks an FMU with a fault; returns the names and observations of the findings, and the report.
 pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
     let unlimited = if options.contains(&"--quick") { &[][..] } else { &UNLIMITED };
@@ -49,22 +43,20 @@ pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)
     (findings.iter().map(|finding| (text(finding, "name"), text(finding, "observed"))).collect(), report)
 }
 
-/// Asserts that the program of a finding does not show the finding in the FMU without the fault. With the fault, the check has
-/// already run the program.
-pub fn not_shown_without_fault(out: &Path, name: &str, unpacked: &Path, fault: &str) {
-    let program = out.join("repro");
-    let source = out.join(format!("{name}.c"));
-    // Only the program of a hang runs until this limit.
-    let patience = if name.ends_with("hang") { "-DPATIENCE=5" } else { "-DPATIENCE=60" };
-    let compiled = Command::new("cc")
-        .args(["-w", patience, "-o"])
-        .arg(&program)
-        .arg(source)
-        .args(["-ldl", "-lpthread", "-lm"])
-        .status();
-    assert!(compiled.expect("a C compiler").success(), "{name}.c");
-    let output = Command::new(&program).arg(unpacked).env("WAGON_FAULT", "none").output().expect("runs");
+/// Asserts that a replay does not show a finding in the FMU without the fault. With the fault, the check has already repeated the
+/// calls.
+pub fn not_shown_without_fault(out: &Path, name: &str, fmu: &Path, fault: &str) {
+    let output = replay(out, name, &["--fmu", &fmu.to_string_lossy()])
+        .env("WAGON_FAULT", "none")
+        .output()
+        .expect("runs");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    let text: String = text.chars().rev().take(2000).collect::<Vec<_>>().into_iter().rev().collect();
     assert_eq!(output.status.code(), Some(0), "{name} is shown in the FMU without {fault}: {text}");
+}
+
+/// Returns the command that executes the calls of a finding of the report in a directory again.
+pub fn replay(out: &Path, name: &str, options: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+    command.arg("replay").arg(out.join("report.json")).arg(name).args(options);
+    command
 }

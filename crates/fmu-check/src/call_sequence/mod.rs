@@ -1,8 +1,13 @@
-//! Call sequences and their results. `worker` executes call sequences, `shrink` shortens them, and `reproduce` writes them as
-//! programs in C.
+//! Call sequences and their results. `worker` executes call sequences, `shrink` shortens them, and reports contain them, so that
+//! `replay` can execute them again.
+
+mod fold;
+mod results;
+
+pub use fold::{fold, unfold};
+pub use results::{End, Measured, Message, Outcome, Run, Values};
 
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
 
 macro_rules! kinds {
     ($($kind:ident $of:ty, $c:literal;)+) => {
@@ -157,6 +162,9 @@ pub enum Step {
     Repeat(usize, Vec<Numbered>),
     /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
+    /// Copies of steps, only in reports: their number, the difference between the numbers of a step in two successive copies,
+    /// and the steps of the first copy.
+    Copies(usize, u32, Vec<Numbered>),
     /// Measures memory, threads, open files and settings of the process.
     Measure,
     /// Continues in a new process. Only the serialized states are passed on to it.
@@ -173,6 +181,7 @@ pub enum Step {
 pub struct Numbered {
     pub id: u32,
     /// Whether the standard forbids the call or its arguments. The state machine of `legal` ignores forbidden calls.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub forbidden: bool,
     pub step: Step,
 }
@@ -184,7 +193,7 @@ pub type CallSequence = Vec<Numbered>;
 pub fn all_steps(sequence: &[Numbered]) -> Vec<&Numbered> {
     let steps = sequence.iter().flat_map(|numbered| {
         let inner = match &numbered.step {
-            Step::Repeat(_, steps) => all_steps(steps),
+            Step::Repeat(_, steps) | Step::Copies(_, _, steps) => all_steps(steps),
             Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| all_steps(sequence)).collect(),
             _ => Vec::new(),
         };
@@ -198,184 +207,24 @@ pub fn step_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
     all_steps(sequence).into_iter().find(|numbered| numbered.id == id)
 }
 
-/// Message that the FMU logged.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Message {
-    pub status: i32,
-    /// Bytes of the category; `None` is NULL.
-    pub category: Option<Vec<u8>>,
-    /// Bytes of the message; `None` is NULL.
-    pub text: Option<Vec<u8>>,
-}
-
-/// Values of a variable or an array.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Values {
-    /// Bits of numbers.
-    Numbers(Kind, Vec<u64>),
-    /// Strings or binary values; `None` is NULL.
-    Strings(Vec<Option<Vec<u8>>>),
-}
-
-impl Values {
-    /// Converts numbers to values of a type.
-    pub fn new(kind: Kind, numbers: impl IntoIterator<Item = f64>) -> Self {
-        Self::Numbers(kind, numbers.into_iter().map(|number| kind.bits(number)).collect())
-    }
-
-    /// Returns `size` copies of a string or binary value.
-    pub fn strings(text: &[u8], size: usize) -> Self {
-        Self::Strings(vec![Some(text.to_owned()); size])
-    }
-
-    pub fn numbers(&self) -> Vec<f64> {
-        match self {
-            Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
-            Self::Strings(_) => Vec::new(),
-        }
-    }
-
-    /// Returns `size` values from the index `begin`; `None` if there are fewer.
-    pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
-        Some(match self {
-            Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
-            Self::Strings(texts) => Self::Strings(texts.get(begin..begin + size)?.to_vec()),
-        })
-    }
-
-    /// Formats the value at an index for messages.
-    pub fn show(&self, index: usize) -> String {
-        match self {
-            Self::Numbers(kind, bits) => match bits.get(index).map(|bits| kind.number(*bits)) {
-                Some(number) if kind.is_float() => format!("{number:?}"),
-                Some(number) => number.to_string(),
-                None => "nothing".to_owned(),
-            },
-            Self::Strings(texts) => match texts.get(index) {
-                Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
-                _ => "NULL".to_owned(),
-            },
-        }
-    }
-
-    /// Returns the first index at which the values differ.
-    pub fn differ(&self, other: &Self) -> Option<usize> {
-        self.differ_beyond(other, 0.0, |_| 1.0)
-    }
-
-    /// Returns the first index at which the values differ. Floating-point numbers differ if their difference exceeds `tolerance`
-    /// times the largest of both magnitudes and the nominal value at the index.
-    pub fn differ_beyond(
-        &self,
-        other: &Self,
-        tolerance: f64,
-        nominal: impl Fn(usize) -> f64,
-    ) -> Option<usize> {
-        match (self, other) {
-            (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
-                // Zeros of both signs are equal, and so are all NaNs.
-                let equal = |index: usize, one: f64, two: f64| {
-                    let scale = || one.abs().max(two.abs()).max(nominal(index));
-                    one == two || one.is_nan() && two.is_nan() || (one - two).abs() <= tolerance * scale()
-                };
-                one.iter().zip(two).enumerate().position(|(index, (one, two))| {
-                    one != two && !(kind.is_float() && equal(index, kind.number(*one), kind.number(*two)))
-                })
-            }
-            (Self::Strings(one), Self::Strings(two)) => one.iter().zip(two).position(|(one, two)| one != two),
-            _ => Some(0),
-        }
-    }
-}
-
-/// Result of a step.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
-    pub id: u32,
-    /// Status that the function returned. It is 1 for an instantiation that returned an instance, 0 for one that returned NULL,
-    /// and 0 for FreeInstance.
-    pub status: Option<i32>,
-    /// Whether the library lacks the function.
-    pub missing: bool,
-    /// Contents of the arrays for results, in the order of the arguments.
-    pub written: Vec<Values>,
-    /// Messages that the FMU logged during the step.
-    pub log: Vec<Message>,
-    /// Messages that the FMU logged with an environment pointer that no instance has received.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub strays: Vec<Message>,
-    /// Descriptions of writes outside of the arrays for results.
-    pub damage: Vec<String>,
-    /// String that the function for the version or the platform returned.
-    pub text: Option<Vec<u8>>,
-    /// Measurement; for repetitions, only their number.
-    pub measured: Option<Measured>,
-}
-
-/// Memory, threads, open files and settings of the process.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// Allocated bytes if `exact`, otherwise the resident memory of the process.
-    pub memory: u64,
-    /// Whether the C library reports the number of allocated bytes.
-    pub exact: bool,
-    pub threads: usize,
-    pub files: usize,
-    /// Settings of the process, such as the working directory and signal handlers, each with its value.
-    pub settings: Vec<String>,
-    /// Number of repetitions; 0 for a measurement.
-    pub times: usize,
-}
-
-/// End of the process that executed a call sequence.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub enum End {
-    /// The last step returned.
-    #[default]
-    Done,
-    /// The process crashed, for this reason.
-    Crash(String),
-    /// The process did not end within this limit in seconds.
-    Hang(f64),
-    /// The process exited before the last step returned, with this status.
-    Exit(i32),
-    /// The library cannot be loaded, for this reason.
-    Unloadable(String),
-    /// The FMU started this many processes, which is more than the limit, so all were ended.
-    Flood(usize),
-}
-
-/// Result of a call sequence.
-#[derive(Clone, Debug, Default)]
-pub struct Run {
-    /// Results by the number of the step.
-    pub outcomes: HashMap<u32, Outcome>,
-    pub end: End,
-    /// Number of the first step without a result, in which the process ended; `None` if all steps have results.
-    pub at: Option<u32>,
-    /// Output on the standard output and the standard error.
-    pub output: String,
-    /// Names of the child processes that were alive after the end of the call sequence.
-    pub orphans: Vec<String>,
-}
-
-impl Run {
-    pub fn outcome(&self, id: u32) -> Option<&Outcome> {
-        self.outcomes.get(&id)
-    }
-
-    pub fn status(&self, id: u32) -> Option<i32> {
-        self.outcome(id)?.status
-    }
-
-    /// Returns whether a call returned OK or Warning.
-    pub fn succeeds(&self, id: u32) -> bool {
-        self.status(id).is_some_and(|status| status <= 1)
-    }
-
-    /// Returns the contents of the first array for results of a step.
-    pub fn written(&self, id: u32) -> Option<&Values> {
-        self.outcome(id)?.written.first()
+/// Returns a short description of a step.
+pub fn step_name(step: &Step) -> String {
+    match step {
+        Step::Make(..) => "the instantiation".to_owned(),
+        Step::Free(_) => "FreeInstance".to_owned(),
+        Step::Call { function, .. } | Step::Version(function) => function.clone(),
+        Step::Repeat(times, steps) => format!(
+            "one of {times} repetitions of {}",
+            steps.first().map_or("nothing".to_owned(), |numbered| step_name(&numbered.step))
+        ),
+        Step::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
+        Step::Integrate(..) => "an integration".to_owned(),
+        Step::Copies(times, ..) => format!("one of {times} copies of calls"),
+        Step::Measure => "a measurement".to_owned(),
+        Step::FreshProcess => "a fresh process".to_owned(),
+        Step::Elsewhere(_) => "another directory".to_owned(),
+        Step::Unload => "unloading the library".to_owned(),
+        Step::Quit => "the exit of the process".to_owned(),
     }
 }
 

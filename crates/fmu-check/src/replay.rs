@@ -1,0 +1,267 @@
+//! Executes the calls of a finding in a report again.
+
+use crate::call_sequence::{Arg, CallSequence, Numbered, Setting, Step, all_steps, step_name, unfold};
+use crate::checker::Checker;
+use crate::evidence::{Evidence, Replay};
+use crate::options::{INTERFACES, Options};
+use crate::report::SCHEMA;
+use crate::reproduce::{Printed, expectation};
+use crate::worker;
+use anyhow::{Context as _, bail};
+use clap::builder::RangedU64ValueParser;
+use fmi_abi::calls::signatures;
+use fmi_abi::{Standard, one_line};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Options of a replay.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReplayOptions {
+    /// The file report.json of a check.
+    pub report: PathBuf,
+    /// Number of the finding in the report, from 1 on, or its name.
+    pub finding: String,
+    /// Calls this FMU instead of the one that the report names, for example after its fault was fixed.
+    #[arg(long, value_name = "FILE")]
+    pub fmu: Option<PathBuf>,
+    /// Executes the calls this many times.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub times: usize,
+    /// Waits before the last call, so that you can attach a debugger and step into the FMU.
+    #[arg(long = "break")]
+    pub wait: bool,
+}
+
+/// Parts of a report that a replay needs.
+#[derive(serde::Deserialize)]
+struct Report {
+    schema: u32,
+    fmu: PathBuf,
+    token: String,
+    findings: Vec<Finding>,
+}
+
+#[derive(serde::Deserialize)]
+struct Finding {
+    name: String,
+    observed: String,
+    replay: Option<Replay>,
+}
+
+/// Executes the calls of a finding again, and prints them with their results. Returns the exit status: 1 if the finding shows, 0
+/// if it does not, and 2 if the calls cannot be executed. After an interrupt it is 130.
+///
+/// The program must call [`run_worker_if_requested`](crate::run_worker_if_requested) first in `main`.
+pub fn replay(options: &ReplayOptions) -> ExitCode {
+    worker::listen_for_interrupts();
+    match show(options) {
+        Ok(shows) if !worker::interrupted() => ExitCode::from(u8::from(shows)),
+        result => {
+            let error = result.err().unwrap_or_else(|| crate::run::Stop::Interrupted.into());
+            eprintln!("error: {}", one_line(&format!("{error:#}")));
+            ExitCode::from(if worker::interrupted() { 130 } else { 2 })
+        }
+    }
+}
+
+/// Returns whether one of the repetitions shows the finding.
+fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
+    let report = read(&options.report)?;
+    let (number, finding) = find(&report, &options.finding)?;
+    let Some(replay) = &finding.replay else {
+        bail!(
+            "the finding {} has no calls, because it concerns the files of the FMU or because the check was interrupted",
+            finding.name
+        )
+    };
+    let path = options.fmu.as_ref().unwrap_or(&report.fmu);
+    let unpacking = Options { execution_tool: true, memory: replay.memory >> 20, ..Options::default() };
+    // The checker is dropped before the directory is removed, because its processes use the directory until they end.
+    let (_scratch, checker) = crate::opened(path, &unpacking, Instant::now())
+        .context("the FMU cannot be called; --fmu names another file")?;
+    let description = &checker.description;
+    let folded = with_token(&replay.sequence, &report.token, &description.token);
+    check_calls(&folded, description.standard)?;
+    let sequence = unfold(&folded);
+    check_libraries(&sequence, &checker)?;
+    let Replay { soft, now, repetitions, limit, ref evidence, .. } = *replay;
+    let setting = Setting { soft, now, repetitions, ..checker.setting.clone() };
+    let stop_before = if options.wait { last(&sequence, evidence) } else { None };
+    print(&format!("Finding {number} of {}: {}", options.report.display(), finding.name));
+    print(&format!("Observed: {}", finding.observed));
+    let mut shown = 0;
+    for time in 1..=options.times {
+        let run = checker.workers.execute_or_stop(&setting, &sequence, limit, stop_before)?;
+        let shows = evidence.shows(&run, &sequence);
+        shown += usize::from(shows);
+        if time == 1 {
+            print(&format!("Calls of {}:", path.display()));
+            let printed = Printed { description, run: Some(&run) };
+            printed.lines(&folded).iter().for_each(|line| print(line));
+            print("The finding shows if all of this holds:");
+            expectation(evidence, &sequence, Some(&run))
+                .iter()
+                .for_each(|line| print(&format!("      {line}")));
+        }
+        if options.times > 1 {
+            print(&format!("Repetition {time}: {}", if shows { "shown" } else { "not shown" }));
+        }
+    }
+    if *evidence == Evidence::Unknown {
+        bail!(
+            "the report does not contain the results that show the finding, because no repetition has shown it"
+        );
+    }
+    print(if shown > 0 { "The finding shows." } else { "The finding does not show." });
+    Ok(shown > 0)
+}
+
+/// Prints a line without control characters.
+fn print(text: &str) {
+    // A closed pipe is not an error.
+    let _ = writeln!(std::io::stdout(), "{}", one_line(text));
+}
+
+fn read(path: &Path) -> anyhow::Result<Report> {
+    let text = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
+    let report: Report = serde_json::from_slice(&text)
+        .with_context(|| format!("{}: is not a report.json of this version of fmu-check", path.display()))?;
+    if report.schema != SCHEMA {
+        bail!(
+            "{}: its schema is {}, but this version of fmu-check reads {SCHEMA}",
+            path.display(),
+            report.schema
+        );
+    }
+    Ok(report)
+}
+
+/// Returns a finding with its number.
+fn find<'r>(report: &'r Report, wanted: &str) -> anyhow::Result<(usize, &'r Finding)> {
+    let numbers = 1..=report.findings.len();
+    let is_wanted =
+        |(number, finding): &(usize, &Finding)| finding.name == wanted || number.to_string() == wanted;
+    numbers.zip(&report.findings).find(is_wanted).with_context(|| {
+        let names: Vec<&str> = report.findings.iter().map(|finding| finding.name.as_str()).collect();
+        format!("the report has no finding {wanted}; its findings are {}", names.join(", "))
+    })
+}
+
+/// Returns the calls with the guid or instantiation token of the FMU that is called, because a new build of an FMU has another one.
+fn with_token(sequence: &[Numbered], reported: &str, token: &str) -> CallSequence {
+    let mut sequence = sequence.to_vec();
+    for numbered in &mut sequence {
+        match &mut numbered.step {
+            Step::Make(_, make) if make.token == reported => token.clone_into(&mut make.token),
+            Step::Repeat(_, steps) | Step::Copies(_, _, steps) => *steps = with_token(steps, reported, token),
+            Step::Parallel(sequences) => {
+                sequences.iter_mut().for_each(|steps| *steps = with_token(steps, reported, token));
+            }
+            _ => {}
+        }
+    }
+    sequence
+}
+
+/// Checks that each function is one of the FMI version and gets the number of its arguments, that the directory of the FMU stays in the temporary
+/// directory, and that copies do not fill the memory, because someone else may have written the report.
+fn check_calls(sequence: &[Numbered], standard: Standard) -> anyhow::Result<()> {
+    if length(sequence) > MOST_STEPS {
+        bail!("the finding has more than {MOST_STEPS} calls");
+    }
+    let find = |function: &str| signatures(standard).iter().find(|signature| signature.rule.name == function);
+    for numbered in all_steps(sequence) {
+        let is_valid = match &numbered.step {
+            Step::Call { function, args, .. } => {
+                find(function).is_some_and(|signature| signature.arguments.len() == args.len())
+                    && !args.iter().any(|arg| matches!(arg, Arg::Out(_, count) if *count > MOST_RESULTS))
+            }
+            Step::Version(name) => VERSIONS.contains(&name.as_str()),
+            Step::Elsewhere(name) => {
+                !name.is_empty() && !name.contains(['/', '\\']) && name != "." && name != ".."
+            }
+            _ => true,
+        };
+        if !is_valid {
+            bail!("call {} of the report is not a call of {standard}", numbered.id);
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the FMU has a library for each interface type that is instantiated.
+fn check_libraries(sequence: &CallSequence, checker: &Checker) -> anyhow::Result<()> {
+    for (index, name) in INTERFACES.into_iter().take(2).enumerate() {
+        let makes = |step: &Step| matches!(step, Step::Make(_, make) if make.co_simulation == (index == 0));
+        let is_used = all_steps(sequence).iter().any(|numbered| makes(&numbered.step));
+        if is_used && checker.setting.libraries[index].is_none() {
+            let unchecked = checker.all_unchecked().into_iter().find(|unchecked| unchecked.name == name);
+            let why = unchecked.map_or("the FMU does not offer it".to_owned(), |unchecked| unchecked.why);
+            bail!("{name} cannot be called: {why}");
+        }
+    }
+    Ok(())
+}
+
+/// Returns the number of steps, with all copies.
+fn length(sequence: &[Numbered]) -> usize {
+    let of_step = |numbered: &Numbered| match &numbered.step {
+        Step::Copies(times, _, steps) => times.saturating_mul(length(steps).max(1)),
+        Step::Repeat(_, steps) => length(steps),
+        Step::Parallel(sequences) => {
+            sequences.iter().map(|steps| length(steps)).fold(0, usize::saturating_add)
+        }
+        _ => 1,
+    };
+    sequence.iter().map(of_step).fold(0, usize::saturating_add)
+}
+
+/// Maximum number of steps of a finding.
+const MOST_STEPS: usize = 1 << 20;
+
+/// Maximum number of results of a call.
+const MOST_RESULTS: usize = 1 << 26;
+
+/// Functions without an argument.
+const VERSIONS: [&str; 3] = ["fmi2GetVersion", "fmi3GetVersion", "fmi2GetTypesPlatform"];
+
+/// Returns the number of the last step that the finding needs: the step during which the process ends, the last one whose results
+/// are compared, or the last one of the sequence.
+fn last(sequence: &CallSequence, evidence: &Evidence) -> Option<u32> {
+    let is_needed = |numbered: &&Numbered| match evidence {
+        Evidence::End(_, Some(name)) => step_name(&numbered.step) == *name,
+        Evidence::Same(calls, _) => calls.iter().any(|call| call.id == numbered.id),
+        _ => true,
+    };
+    sequence.iter().rfind(is_needed).or(sequence.last()).map(|numbered| numbered.id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_calls;
+    use crate::call_sequence::{Arg, Numbered, Step};
+    use fmi_abi::Standard;
+
+    #[test]
+    fn only_calls_of_fmi_are_executed() {
+        let valid =
+            |step: Step| check_calls(&[Numbered { id: 1, forbidden: false, step }], Standard::Fmi2).is_ok();
+        let call = |function: &str, args: Vec<Arg>| Step::Call {
+            instance: Some(0),
+            function: function.to_owned(),
+            args,
+        };
+        assert!(valid(call("fmi2Reset", Vec::new())));
+        assert!(!valid(call("fmi2Reset", vec![Arg::Null])));
+        assert!(!valid(call("system", Vec::new())) && !valid(call("fmi3Reset", Vec::new())));
+        assert!(valid(Step::Elsewhere("a b%".to_owned())) && !valid(Step::Elsewhere("../here".to_owned())));
+        assert!(!valid(Step::Version("abort".to_owned())));
+        let copied = Numbered { id: 1, forbidden: false, step: Step::Measure };
+        assert!(valid(Step::Copies(20, 1, vec![copied.clone()])));
+        assert!(
+            !valid(Step::Copies(1 << 40, 1, vec![copied])) && !valid(Step::Copies(1 << 40, 1, Vec::new()))
+        );
+    }
+}
