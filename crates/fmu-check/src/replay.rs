@@ -6,6 +6,7 @@ use crate::evidence::{Evidence, Replay};
 use crate::options::{INTERFACES, Options};
 use crate::report::SCHEMA;
 use crate::reproduce::{Printed, expectation};
+use crate::run::{Manner, Stop};
 use crate::worker;
 use anyhow::{Context as _, bail};
 use clap::builder::RangedU64ValueParser;
@@ -59,7 +60,7 @@ pub fn replay(options: &ReplayOptions) -> ExitCode {
     match show(options) {
         Ok(shows) if !worker::interrupted() => ExitCode::from(u8::from(shows)),
         result => {
-            let error = result.err().unwrap_or_else(|| crate::run::Stop::Interrupted.into());
+            let error = result.err().unwrap_or_else(|| Stop::Interrupted.into());
             eprintln!("error: {}", one_line(&format!("{error:#}")));
             ExitCode::from(if worker::interrupted() { 130 } else { 2 })
         }
@@ -88,12 +89,13 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
     check_libraries(&sequence, &checker)?;
     let Replay { soft, now, repetitions, limit, ref evidence, .. } = *replay;
     let setting = Setting { soft, now, repetitions, ..checker.setting.clone() };
-    let stop_before = if options.wait { last(&sequence, evidence) } else { None };
+    let last = last(&sequence, evidence).filter(|_| options.wait);
+    let manner = last.map_or(Manner::Usual, Manner::Debugged);
     print(&format!("Finding {number} of {}: {}", options.report.display(), finding.name));
     print(&format!("Observed: {}", finding.observed));
     let mut shown = 0;
     for time in 1..=options.times {
-        let run = checker.workers.execute_or_stop(&setting, &sequence, limit, stop_before)?;
+        let run = checker.workers.execute_as(manner, &setting, &sequence, limit)?;
         let shows = evidence.shows(&run, &sequence);
         shown += usize::from(shows);
         if time == 1 {

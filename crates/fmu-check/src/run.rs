@@ -19,8 +19,19 @@ pub struct Workers {
 }
 
 /// Kind of worker: the number of earlier processes of the call sequence, and whether the loader resolves all symbols when it
-/// loads a library. Both decide which environment variables the process is started with.
-type WorkerKind = (usize, bool);
+/// loads a library. Both decide which environment variables the process is started with. The third is set for `Manner::Again`.
+type WorkerKind = (usize, bool, bool);
+
+/// Manner in which a call sequence is executed.
+#[derive(Clone, Copy)]
+pub enum Manner {
+    Usual,
+    /// In processes that do not have the addresses of the usual ones. On Linux, processes that the same server forks have the same
+    /// addresses, so results that depend on addresses would be equal in a repetition, but not in a later replay.
+    Again,
+    /// The process with the step of this number waits for a debugger before this step, and then has no limit.
+    Debugged(u32),
+}
 
 /// Reason why a check cannot continue.
 #[derive(Debug)]
@@ -46,7 +57,7 @@ impl std::fmt::Display for Stop {
 impl std::error::Error for Stop {}
 
 /// Returns the command that starts this program as a worker.
-fn worker(job: &Path, scratch: &Path, (phase, now): WorkerKind) -> anyhow::Result<Command> {
+fn worker(job: &Path, scratch: &Path, (phase, now, _): WorkerKind) -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .env(VARIABLE, job)
@@ -70,8 +81,8 @@ impl Workers {
         Ok(Self {
             #[cfg(target_os = "linux")]
             idle: std::sync::Mutex::new(HashMap::from([(
-                (0, false),
-                vec![Server::new((0, false), &scratch)?],
+                (0, false, false),
+                vec![Server::new((0, false, false), &scratch)?],
             )])),
             scratch,
         })
@@ -79,24 +90,26 @@ impl Workers {
 
     /// Executes a call sequence with a limit in seconds for each process. Each `FreshProcess` step starts another process.
     pub fn execute(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
-        self.execute_or_stop(setting, sequence, limit, None)
+        self.execute_as(Manner::Usual, setting, sequence, limit)
     }
 
-    /// Executes a call sequence. The process with the step of the number `stop_before` waits for a debugger before this step, and
-    /// then has no limit.
-    pub fn execute_or_stop(
+    /// Executes a call sequence, as `execute` does, in another manner.
+    pub fn execute_as(
         &self,
+        manner: Manner,
         setting: &Setting,
         sequence: &CallSequence,
         limit: f64,
-        stop_before: Option<u32>,
     ) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
         for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
-            let stop_before = stop_before.filter(|id| part.iter().any(|numbered| numbered.id == *id));
+            let stop_before = match manner {
+                Manner::Debugged(id) => part.iter().map(|numbered| numbered.id).find(|other| *other == id),
+                Manner::Usual | Manner::Again => None,
+            };
             let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes, stop_before };
-            let kind = (phase, setting.now);
+            let kind = (phase, setting.now, matches!(manner, Manner::Again));
             let ended = match stop_before {
                 None => self.process(&job, kind, limit)?,
                 Some(_) => self.debugged(&job, kind)?,

@@ -5,7 +5,7 @@ use crate::call_sequence::{CallSequence, End, Run, Setting, Step};
 use crate::evidence::Evidence;
 use crate::finding::{Finding, Proof};
 use crate::reproduce;
-use crate::run::Stop;
+use crate::run::{Manner, Stop};
 use crate::shrink::shrink;
 use crate::worker::interrupted;
 use std::time::Instant;
@@ -94,13 +94,14 @@ impl Checker {
         let setting = self.reproducing_setting(finding);
         // The calls are also reported if there is no time to repeat them.
         reproduce::write(finding, Evidence::Unknown, &setting, limit, &self.description);
-        let first = self.repetition(finding, until, |run| criterion(run).is_some())?;
+        let first = self.repetition(finding, until, Manner::Usual, |run| criterion(run).is_some())?;
         let evidence = first.as_ref().map_or(Evidence::Unknown, |run| reproduce::evidence(finding, run));
         reproduce::write(finding, evidence.clone(), &setting, limit, &self.description);
         if first.is_none() {
             return Ok(Proof::NotShown("a repetition of its calls does not show it".to_owned()));
         }
-        let second = self.repetition(finding, until, |run| evidence.shows(run, &finding.sequence))?;
+        let second =
+            self.repetition(finding, until, Manner::Again, |run| evidence.shows(run, &finding.sequence))?;
         Ok(match second {
             Some(_) => Proof::Shown,
             None => Proof::NotShown("a second repetition of its calls has other results".to_owned()),
@@ -120,6 +121,7 @@ impl Checker {
         &self,
         finding: &Finding,
         until: Instant,
+        manner: Manner,
         shows: impl Fn(&Run) -> bool,
     ) -> anyhow::Result<Option<Run>> {
         let limit = self.reproducing_limit(finding);
@@ -130,7 +132,7 @@ impl Checker {
                 return Err(Stop::TimeOver.into());
             }
             let setting = self.reproducing_setting(finding);
-            let run = self.workers.execute(&setting, &finding.sequence, limit.min(remaining))?;
+            let run = self.workers.execute_as(manner, &setting, &finding.sequence, limit.min(remaining))?;
             if matches!(run.end, End::Hang(seconds) if seconds < limit && !finding.name.ends_with("hang")) {
                 return Err(Stop::TimeOver.into());
             }
