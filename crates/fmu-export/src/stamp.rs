@@ -10,12 +10,12 @@ use crate::table::Variables;
 use fmi_abi::stamp::Stamp;
 use fmi_abi::{BaseType, Value};
 
-/// Reads the stamp of a model from memory.
-pub(crate) fn stamp<M: Exported>() -> Stamp {
-    let stamp: *const Stamp = M::stamp();
-    // SAFETY: the pointer comes from a reference to a static. The read is volatile, because fmu-package changes the bytes after the
-    // compiler has seen them.
-    unsafe { stamp.read_volatile() }
+/// Returns the stamp of a model as it is in the library.
+pub(crate) fn stamp<M: Exported>() -> &'static Stamp {
+    let stamp = M::stamp();
+    // SAFETY: reads a local variable. Because the read is volatile, the compiler does not know that the reference leads to the static whose
+    // bytes it has seen, and which fmu-package changes.
+    unsafe { (&raw const stamp).read_volatile() }
 }
 
 /// Returns the guid of the FMU to which this library belongs. It consists of zeros until fmu-package has packed the library.
