@@ -58,7 +58,7 @@ BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(
 # Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) dev/tools/has_page.py $(FMU)
 
-TWO_JOBS = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2)
+jobs = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(1))
 
 stop = { echo '$(1)' >&2; exit 1; }
 
@@ -110,14 +110,15 @@ help:
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
 # Downloads and the compiler run in parallel. If one fails, both run again in sequence, so the error message comes last.
-# The page that runs the FMU takes longest to build. If the existing FMU contains the page, the new one does too.
+# fmu-run takes longest, so it comes first (nice). The page that runs the FMU takes as long; if the existing FMU contains the page,
+# the new one does too.
 demo: need-rust need-python
-	@$(MAKE) --no-print-directory $(TWO_JOBS) $(VENV)/demo.stamp demo-fmu || \
+	@$(MAKE) --no-print-directory $(call jobs,3) $(VENV)/demo.stamp demo-fmu || \
 	  $(MAKE) --no-print-directory $(VENV)/demo.stamp demo-fmu
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 demo-fmu: need-rust
-	@$(BUILD_FMU) $$($(HAS_PAGE) || echo --no-page)
+	@nice $(BUILD_FMU) $$($(HAS_PAGE) || echo --no-page)
 
 fmu: need-rust $(if $(PROGRAMS),compile-tests)
 	@$(ADD_WEBASSEMBLY) || true
@@ -134,7 +135,7 @@ check-release: $(VENV)/importers.stamp need-rust
 # Two targets run at a time, so that no processor waits during an installation. The FMUs are built by the programs that
 # the Rust tests compiled. make test-long runs the tests that are left out here.
 test: need-rust need-python
-	@$(MAKE) --no-print-directory $(TWO_JOBS) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
+	@$(MAKE) --no-print-directory $(call jobs,2) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
 	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
 	$(PY) dev/platforms/bill_of_materials.py --check
 	PROGRAMS=target/debug $(PYTEST) -m 'not long' $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
@@ -333,10 +334,14 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | $(VENV)/build.stamp need-
 PACKAGES_demo := -r python/prw/pyproject.toml --extra plot
 PACKAGES_study := -r python/prw/pyproject.toml --extra study
 
-$(VENV)/demo.stamp: $(LOCK) pyproject.toml python/prw/pyproject.toml $(VENV)/fmu_run.stamp
+# fmu-run needs none of these packages to compile, so they are installed at the same time.
+$(VENV)/packages.stamp: $(LOCK) pyproject.toml python/prw/pyproject.toml | $(VENV)/build.stamp
 	@echo 'installing the Python packages of the demo (once)'
 	@$(INSTALL_LOCKED) $(PACKAGES_demo)
 	@$(UV_INSTALL) --no-deps --no-build-isolation --editable python/prw
+	@touch $@
+
+$(VENV)/demo.stamp: $(VENV)/packages.stamp $(VENV)/fmu_run.stamp
 	@touch $@
 
 $(VENV)/build.stamp: $(VENV)/made.stamp
