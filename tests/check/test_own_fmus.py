@@ -9,7 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from built import FMUS, ROOT, built
+from built import ROOT, built
 
 from tools.documentation.sources import read_table
 

@@ -6,7 +6,7 @@ use fmu_package::{BuildOptions, Builder, cargo};
 use std::env;
 use std::ffi::OsString;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The purpose of an FMU.
@@ -68,11 +68,17 @@ pub fn arguments_of_build() -> Vec<OsString> {
     kept
 }
 
-/// Returns the content of the `Cargo.lock` that this command was tested with. It is empty unless this command was compiled in a clone that
-/// still exists.
+/// Returns the clone of this project that contains this program, or else the clone in which it was compiled, if that still exists. The
+/// first one matters after a clone was copied together with its directory `target`.
+pub fn own_clone() -> Option<PathBuf> {
+    let program = env::current_exe().unwrap_or_default();
+    let mut directories = program.ancestors().chain(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors());
+    directories.find(|directory| directory.join("crates/fmu-export/Cargo.toml").is_file()).map(Path::to_owned)
+}
+
+/// Returns the content of the `Cargo.lock` that this command was tested with. It is empty if there is no clone.
 pub fn tested_lock() -> String {
-    let lock = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(|root| root.join("Cargo.lock"));
-    lock.and_then(|lock| fs::read_to_string(lock).ok()).unwrap_or_default()
+    own_clone().and_then(|root| fs::read_to_string(root.join("Cargo.lock")).ok()).unwrap_or_default()
 }
 
 /// Writes a file unless it is up to date, so that cargo does not see a changed file.

@@ -1,6 +1,6 @@
 //! Creates a crate from one of the models that this command contains.
 
-use crate::builder::{tested_lock, write};
+use crate::builder::{own_clone, tested_lock, write};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::cargo;
 use fmu_package::terminal::short;
@@ -153,13 +153,12 @@ enum Dependency {
 impl Dependency {
     /// Returns the source of fmu-export for a model in a directory.
     fn of(directory: &Path, repository: Option<&str>) -> Result<Self> {
-        let package = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
-        let is_there = package.join("Cargo.toml").is_file();
+        let package = own_clone().map(|root| root.join("crates/fmu-export"));
         if let Some(url) = repository {
-            let revision = git(&package, &["rev-parse", "HEAD"]);
-            let revision = revision.with_context(|| {
-                format!("{} is not in a git repository, so there is no revision to name", package.display())
-            })?;
+            let revision = package.as_deref().and_then(|package| git(package, &["rev-parse", "HEAD"]));
+            let revision = revision.context(
+                "this program is not in a clone of its git repository, so there is no revision to name",
+            )?;
             return Ok(Self::Git(url.to_owned(), revision));
         }
         let directory = fs::canonicalize(directory).with_context(|| short(directory))?;
@@ -167,12 +166,12 @@ impl Dependency {
         let parent = directory.parent().unwrap_or(&directory);
         let root = git(parent, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
         if let Some(root) = &root {
-            let own = package.starts_with(root) && is_there;
-            if let Some(package) = own.then(|| package.clone()).or_else(|| package_in(root)) {
+            let own = package.clone().filter(|package| package.starts_with(root));
+            if let Some(package) = own.or_else(|| package_in(root)) {
                 return Ok(Self::Relative(relative(&directory, &package)));
             }
         }
-        Ok(if is_there { Self::Local(package) } else { Self::Registry })
+        Ok(package.map_or(Self::Registry, Self::Local))
     }
 
     fn in_manifest(&self) -> String {

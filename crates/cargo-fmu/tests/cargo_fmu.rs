@@ -350,6 +350,29 @@ fn other_packages_are_rejected() {
     assert!(output.contains("could not find `Cargo.toml`"), "{output}");
 }
 
+/// A clone may be copied together with the compiled program, which must then not name the original.
+#[test]
+#[cfg(unix)]
+fn a_copied_program_names_its_own_clone() {
+    let directory = Directory::new();
+    let root = fs::canonicalize(directory.path("")).unwrap();
+    for (from, to) in [
+        (Path::new(env!("CARGO_BIN_EXE_cargo-fmu")), "copy/target/debug/cargo-fmu"),
+        (
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("../fmu-export/Cargo.toml"),
+            "copy/crates/fmu-export/Cargo.toml",
+        ),
+    ] {
+        fs::create_dir_all(directory.path(to).parent().unwrap()).unwrap();
+        fs::copy(from, directory.path(to)).unwrap();
+    }
+    let program = directory.path("copy/target/debug/cargo-fmu");
+    let output = directory.run("", program.to_str().unwrap(), &["fmu", "new", "model"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let named = format!("path = {:?}", root.join("copy/crates/fmu-export"));
+    assert!(directory.read("model/Cargo.toml").contains(&named), "{}", directory.read("model/Cargo.toml"));
+}
+
 /// Within one repository, the model names fmu-export by a relative path; with `--git`, by a commit. Both are still valid after the
 /// repository or the model was moved to another directory.
 #[test]
