@@ -29,7 +29,7 @@ const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused
 /// Number of files to compile.
 pub const COMPILED: usize = 2;
 
-/// Translates a WebAssembly module to C. Returns the files in the FMU's directory `sources`: names and contents. The first [`COMPILED`]
+/// Translates a WebAssembly module to C. Returns the files in the FMU's directory `sources`: names and contents. The first two
 /// files are to be compiled.
 ///
 /// # Errors
