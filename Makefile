@@ -63,7 +63,7 @@ jobs = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(1))
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test compile-tests test-rust test-crates test-docs check-windows test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test test-long compile-tests test-rust test-crates test-docs check-windows test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'

@@ -108,11 +108,14 @@ def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") ->
 def steps(guid: str, sources: Path | None) -> None:
     """Compares steps of the FMU with the C programs. If the FMU's C sources are given, also compares them with its library."""
 
+    guids = {"sources": str(fmpy.read_model_description(str(sources)).guid)} if sources else {}
+
     def seconds(library: str, way: int, count: int, threads: int = 1) -> float:
-        return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]
+        repetitions = count // 100 if QUICK else count
+        return bench(WORK / f"{library}.so", guids.get(library, guid), way, repetitions, threads)[0]
 
     def outputs(library: str, way: int) -> np.ndarray:
-        return bench(WORK / f"{library}.so", guid, way, 2000, 0)[1].reshape(-1, 4)
+        return bench(WORK / f"{library}.so", guids.get(library, guid), way, 2000, 0)[1].reshape(-1, 4)
 
     others = [("euler", OMEGA, 20_000)]
     if sources:

@@ -251,7 +251,6 @@ def test_c_programs_get_bit_identical_results(system: System, tmp_path: Path) ->
     times."""
     tests = ROOT / "crates" / "fmu-export" / "tests" / "c"
     common = ("-std=c11", "-DTESTBED", f"-I{tests}", f"-I{Path(fmpy.__file__).parent / 'c-code'}", tests / "drive.c")
-    guid = fmpy.read_model_description(str(FMUS[0])).guid
     printed = []
     here = System((), Path(), system.environment, str, "x86_64-linux-gnu.2.17", FMUS[0], "linux64")
     for each in (here, system):
@@ -259,5 +258,6 @@ def test_c_programs_get_bit_identical_results(system: System, tmp_path: Path) ->
         library.write_bytes(binaries(each.fmu)[each.directory])
         loader = f"-I{HERE / 'windows'}" if each.directory == "win64" else "-ldl"
         zig_cc(each.zig, *common, loader, "-o", program)
+        guid = fmpy.read_model_description(str(each.fmu)).guid
         printed.append(run(*each.start, program, each.path(library), guid, environment=each.environment))
     assert printed[0] == printed[1] and "me3 " in printed[0]

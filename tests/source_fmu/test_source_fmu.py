@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -37,9 +38,9 @@ def references(description: fmpy.model_description.ModelDescription) -> list[int
 
 
 @pytest.fixture(scope="module")
-def library_hash(description: fmpy.model_description.ModelDescription) -> str:
+def library_hash() -> str:
     """Returns the hash that steps.c must print: the hash of the same outputs, computed with the FMU that contains the library."""
-    unpacked = fmpy.extract(str(FMU))
+    unpacked, description = fmpy.extract(str(FMU)), fmpy.read_model_description(str(FMU))
     slave = FMU2Slave(
         guid=description.guid, unzipDirectory=unpacked, modelIdentifier="prw_testbed", instanceName="library"
     )
@@ -251,44 +252,58 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
         assert results[0].tobytes() == results[1].tobytes()
 
 
-def cargo_test(library: Path, *arguments: str, profile: str = "release", **environment: str) -> str:
-    """Runs Rust tests on a library compiled from the C sources, and returns their output. The model in the tests is compiled with the
-    guid of the source FMU."""
-    command = ["cargo", "test", "--locked", "--profile", profile, *arguments]
+@pytest.fixture(scope="module")
+def unpacked_without_guid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory `sources` of the FMU, with zeros as guid, as in the model that Rust tests contain."""
+    directory = unpack(SOURCE_FMU, tmp_path_factory.mktemp("zeros"))
     guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
-    environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
+    listed, zeros = ([f"0x{byte:02x}" for byte in text.encode()] for text in (guid, re.sub(r"\w", "0", guid)))
+    code = directory / "prw_testbed.c"
+    text, count = re.subn(r",\s+".join(listed), ", ".join(zeros), code.read_text(encoding="utf-8"))
+    assert count == 1
+    code.write_text(text, encoding="utf-8")
+    return directory
+
+
+def cargo_test(library: Path, *arguments: str, profile: str = "release", **environment: str) -> str:
+    """Runs Rust tests on a library compiled from the C sources, and returns their output."""
+    command = ["cargo", "test", "--locked", "--profile", profile, *arguments]
+    environment = {**os.environ, "FMU_LIBRARY": str(library), **environment}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
-def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
+def test_the_tests_of_the_library_pass(unpacked_without_guid: Path, tmp_path: Path) -> None:
     """Compares all results of random sessions, and runs the tests of the C interface, on the compiled sources."""
     library = tmp_path / "compiled.so"
-    files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
+    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     # The sessions pass arrays of 5000 values, for which the default memory is too small.
-    COMPILERS["gcc"].compile(sources, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
+    COMPILERS["gcc"].compile(
+        unpacked_without_guid, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm"
+    )
     output = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
     assert f"in {os.environ.get('SESSIONS', '300')} sessions" in output
 
 
 @pytest.mark.small
-def test_random_sessions(sources: Path, tmp_path: Path) -> None:
-    """Runs fewer sessions than the test above. With `--workspace`, cargo reuses the dependencies that `make test` has compiled; only code
-    that contains the guid is compiled again."""
+def test_random_sessions(unpacked_without_guid: Path, tmp_path: Path) -> None:
+    """Runs fewer sessions than the test above. With `--workspace`, cargo reuses what `make test` has compiled."""
     COMPILERS["gcc"].require()
     library = tmp_path / "compiled.so"
-    files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
-    COMPILERS["gcc"].compile(sources, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
+    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
+    COMPILERS["gcc"].compile(
+        unpacked_without_guid, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm"
+    )
     arguments = ("--workspace", "--test", "c_sources", "--", "--ignored", "--nocapture")
     assert "in 30 sessions" in cargo_test(library, *arguments, profile="dev", SESSIONS="30")
 
 
-def test_random_sessions_with_sanitizers(sources: Path, tmp_path: Path) -> None:
+def test_random_sessions_with_sanitizers(unpacked_without_guid: Path, tmp_path: Path) -> None:
     library = tmp_path / "compiled.so"
-    files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
+    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     options = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g", "-fPIC", "-shared")
-    COMPILERS["gcc"].compile(sources, library, *options, "-DFMU_MEMORY_PAGES=64", *files, "-lm")
+    COMPILERS["gcc"].compile(unpacked_without_guid, library, *options, "-DFMU_MEMORY_PAGES=64", *files, "-lm")
     asan = subprocess.run(["gcc", "-print-file-name=libasan.so"], check=True, capture_output=True, text=True).stdout
     rustc = subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout
     (host,) = (line.removeprefix("host: ") for line in rustc.splitlines() if line.startswith("host: "))
