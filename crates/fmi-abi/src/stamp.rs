@@ -103,7 +103,13 @@ impl Stamp {
 
     /// Returns the guid.
     pub fn guid(&self) -> &str {
-        std::str::from_utf8(&self.0[GUID]).unwrap_or(NO_GUID)
+        std::str::from_utf8(self.guid_bytes()).unwrap_or(NO_GUID)
+    }
+
+    /// Returns the guid as bytes.
+    #[inline]
+    pub fn guid_bytes(&self) -> &[u8] {
+        &self.0[GUID]
     }
 
     /// Returns the start values: the index of each variable in the table, and its value.

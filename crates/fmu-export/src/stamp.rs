@@ -25,14 +25,17 @@ pub fn guid<M: Exported>() -> String {
 
 /// Creates a model with the start values of the FMU: these in the stamp, and for the other variables those of
 /// [`Model::new`](crate::Model::new).
+#[inline]
 pub(crate) fn new_model<M: Exported>(setup: &Setup) -> Result<M, Error> {
+    // Returns the model without moving it, because it may be large.
+    if stamp::<M>().starts().next().is_none() { M::new(setup) } else { new_variant(setup) }
+}
+
+#[cold]
+#[inline(never)]
+fn new_variant<M: Exported>(setup: &Setup) -> Result<M, Error> {
     let mut model = M::new(setup)?;
-    let stamp = stamp::<M>();
-    let mut starts = stamp.starts().peekable();
-    if starts.peek().is_none() {
-        return Ok(model);
-    }
-    for (index, value) in starts {
+    for (index, value) in stamp::<M>().starts() {
         let Some(variable) = M::TABLE.get(index as usize) else { continue };
         let value = match variable.base() {
             BaseType::Real | BaseType::Float32 => Value::Real(value),

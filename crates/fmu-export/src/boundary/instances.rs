@@ -5,7 +5,7 @@ use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, reject};
 use crate::log::{Logger, Message};
 use crate::model::Setup;
-use crate::stamp::guid;
+use crate::stamp::stamp;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
 use fmi_abi::{Interface, Standard};
@@ -69,15 +69,16 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
     let Some(name) = name.filter(|name| !name.to_bytes().trim_ascii().is_empty()) else {
         return reject("the instance needs a name");
     };
-    let own = guid::<M>();
-    if wanted.map(CStr::to_bytes) != Some(own.as_bytes()) {
+    let own = stamp::<M>();
+    if wanted.map(CStr::to_bytes) != Some(own.guid_bytes()) {
         let what = match importer.standard {
             Standard::Fmi2 => "guid",
             Standard::Fmi3 => "instantiationToken",
         };
         return reject(format!(
-            "the {what} {} is not this library's {own}: modelDescription.xml and library come from different FMUs",
+            "the {what} {} is not this library's {}: modelDescription.xml and library come from different FMUs",
             wanted.map_or("NULL".into(), CStr::to_string_lossy),
+            own.guid(),
         ));
     }
     let string = |string: &CStr| string.to_string_lossy().into_owned();

@@ -114,7 +114,7 @@ fn check<M: Exported>(state: &State<M>) -> Outcome {
 /// Identifies the FMU. Depends on the table as well, because all libraries that are not packed have the same guid.
 fn guid_hash<M: Exported>() -> [u8; 8] {
     let stamp = stamp::<M>();
-    fnv1a(&[stamp.interface(), stamp.guid().as_bytes()].concat()).to_le_bytes()
+    fnv1a(&[stamp.interface(), stamp.guid_bytes()].concat()).to_le_bytes()
 }
 
 /// Computes the FNV-1a hash. It detects any single changed byte, because every step maps different hashes to
