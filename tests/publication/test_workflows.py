@@ -161,7 +161,7 @@ def test_the_makefile_installs_every_group_with_hashes() -> None:
     """Only packages of this repository have no hashes. The installed tools build them, so nothing is downloaded."""
     stamps = [f".venv/{name}.stamp" for name in ("importers", "examples", "wasm2c")]
     stamps.append(".venv-dist/test-platforms.stamp")
-    # This test may run in a recipe, whose make must not influence this one.
+    # `make test` starts this test; its MAKEFLAGS would change what the make below prints.
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     command = ["make", "--dry-run", "--always-make", *stamps]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)

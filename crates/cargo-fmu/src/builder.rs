@@ -69,7 +69,7 @@ pub fn arguments_of_build() -> Vec<OsString> {
 }
 
 /// Returns the clone of this project that contains this program, or else the clone in which it was compiled, if that still exists. The
-/// first one matters after a clone was copied together with its directory `target`.
+/// two differ if a clone was copied together with its directory `target`, and then the copy must not use the original.
 pub fn own_clone() -> Option<PathBuf> {
     let program = env::current_exe().unwrap_or_default();
     let mut directories = program.ancestors().chain(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors());

@@ -18,6 +18,7 @@ mod files;
 mod filling;
 pub mod fmi2;
 pub mod fmi3;
+mod hash;
 mod info;
 mod instance;
 mod integrate;

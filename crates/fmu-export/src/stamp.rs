@@ -5,6 +5,7 @@
 )]
 
 use crate::export::Exported;
+use crate::hash::{EMPTY, fnv1a};
 use crate::model::{Error, Setup};
 use crate::table::Variables;
 use fmi_abi::stamp::Stamp;
@@ -23,8 +24,8 @@ pub fn guid<M: Exported>() -> String {
     stamp::<M>().guid().to_owned()
 }
 
-/// Creates a model with the start values of the FMU: these in the stamp, and for the other variables those of
-/// [`Model::new`](crate::Model::new).
+/// Creates a model with the start values of the FMU: start values in the stamp replace the values that
+/// [`Model::new`](crate::Model::new) sets.
 #[inline]
 pub(crate) fn new_model<M: Exported>(setup: &Setup) -> Result<M, Error> {
     // Returns the model without moving it, because it may be large.
@@ -49,31 +50,21 @@ fn new_variant<M: Exported>(setup: &Setup) -> Result<M, Error> {
     Ok(model)
 }
 
-/// Returns a hash of the lines of the table (FNV-1a): names, types, causalities, variabilities and dimensions. Libraries in one FMU must
-/// agree in these, because they share a description.
+/// Returns a hash of the lines of the table: names, types, causalities, variabilities and dimensions. Libraries in one FMU must agree in
+/// these, because they share a description.
 #[doc(hidden)]
 pub const fn hash_of_interface<M: Variables>() -> u64 {
-    let (mut hash, mut line) = (0xcbf2_9ce4_8422_2325, 0);
+    let (mut hash, mut line) = (EMPTY, 0);
     while line < M::LINES.len() {
         let of = &M::LINES[line];
-        let (name, mut letter) = (of.name().as_bytes(), 0);
-        while letter < name.len() {
-            hash = with_byte(hash, name[letter]);
-            letter += 1;
-        }
-        hash = with_byte(hash, of.base() as u8);
-        hash = with_byte(hash, of.causality() as u8);
-        hash = with_byte(hash, of.variability() as u8);
+        hash = fnv1a(hash, of.name().as_bytes());
+        hash = fnv1a(hash, &[of.base() as u8, of.causality() as u8, of.variability() as u8]);
         let (sizes, mut direction) = (of.dimensions(), 0);
         while direction < sizes.len() {
-            hash = with_byte(hash ^ sizes[direction] as u64, 1);
+            hash = fnv1a(hash, &(sizes[direction] as u64).to_le_bytes());
             direction += 1;
         }
         line += 1;
     }
     hash
-}
-
-const fn with_byte(hash: u64, byte: u8) -> u64 {
-    (hash ^ byte as u64).wrapping_mul(0x0000_0100_0000_01b3)
 }

@@ -26,11 +26,12 @@ const FMI2: &str = include_str!("c/fmi2.c");
 const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
                       #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
 
-/// Number of files to compile.
-pub const COMPILED: usize = 2;
+/// Returns the names of the files in the directory `sources` that are to be compiled.
+pub fn compiled_files(identifier: &str) -> [String; 2] {
+    [format!("{identifier}.c"), format!("{identifier}_fmi2.c")]
+}
 
-/// Translates a WebAssembly module to C. Returns the files in the FMU's directory `sources`: names and contents. The first two
-/// files are to be compiled.
+/// Translates a WebAssembly module to C. Returns the files in the FMU's directory `sources`: names and contents.
 ///
 /// # Errors
 /// When wasm2c cannot be started or fails, or when its output has an unknown form.
@@ -54,16 +55,16 @@ pub fn c_sources(wasm2c: &OsStr, module: &[u8], identifier: &str) -> Result<File
         |name: &str| fs::read_to_string(directory.path().join(name)).context("wasm2c has written nothing");
     let (header, code) = (read("module.h")?, read("module.c")?);
     let names = Names { identifier, prefix: identifier.replace('_', "__") };
-    let file = |name: &str, text: String| (format!("{identifier}{name}"), text.into_bytes());
+    let [module, functions] = compiled_files(identifier);
     let include = |text: &str| {
         text.replace("\"module.h\"", &format!("\"{identifier}.h\""))
             .replace("\"wasm-rt.h\"", &format!("\"{identifier}_runtime.h\""))
     };
     Ok(vec![
-        file(".c", names.code(&code)?),
-        file("_fmi2.c", include(FMI2)),
-        file(".h", include(&names.header(&header, &code)?)),
-        file("_runtime.h", RUNTIME.to_owned()),
+        (module, names.code(&code)?.into_bytes()),
+        (functions, include(FMI2).into_bytes()),
+        (format!("{identifier}.h"), include(&names.header(&header, &code)?).into_bytes()),
+        (format!("{identifier}_runtime.h"), RUNTIME.into()),
     ])
 }
 

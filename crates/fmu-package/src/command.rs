@@ -1,6 +1,6 @@
 //! The command `build_fmu`, which is the same for every model.
 
-use crate::c_sources::{COMPILED, LINKING, WEBASSEMBLY, c_sources, check_tools};
+use crate::c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools, compiled_files};
 use crate::cargo::LibraryBuild;
 use crate::connectors::{Terminal, terminals};
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
@@ -57,7 +57,7 @@ pub struct Builder {
     pub terminals: Vec<Terminal>,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
-    /// Start values that differ from these of the compiled model: the variable's name and the value, for example `0.5`, `true`, or the
+    /// Start values that replace the start values of the compiled model: the variable's name and the value, for example `0.5`, `true`, or the
     /// number of an item. They are written into the compiled library, so the library need not be compiled again.
     pub start: Vec<(String, String)>,
     /// Label in messages for a build with other parameter values than the default ones. `None` for the default values, whose
@@ -113,7 +113,7 @@ impl Builder {
         let Variant { model, starts, _directory } = self.variant_of(&mut libraries, &target, time_limit)?;
         let module = if options.c_sources { Some(self.module()?) } else { None };
         let c_sources = |guid: &str| self.c_sources(module.as_deref(), guid, &starts, model.identifier());
-        let source_files = c_sources(NO_GUID)?.iter().take(COMPILED).map(|(name, _)| name.clone()).collect();
+        let source_files = module.as_ref().map_or(Vec::new(), |_| compiled_files(model.identifier()).into());
         let changes = Changes { tunable_parameters: options.tunable, source_files };
         let terminals = terminals(&model, &self.terminals, &content)?;
         let versions = self.versions(options, &model);
@@ -132,7 +132,12 @@ impl Builder {
         let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
         let page = match options.no_page || options.c_sources || !can_have_page {
             true => None,
-            false => self.page.compile(&self.build(), self.describe(&model, Standard::Fmi2, &changes)?)?,
+            false => {
+                let made = descriptions.iter().find(|(fmi, _)| *fmi == Standard::Fmi2);
+                let describe = || self.describe(&model, Standard::Fmi2, &changes);
+                let description = made.map_or_else(describe, |(_, description)| Ok(description.clone()))?;
+                self.page.compile(&self.build(), description)?
+            }
         };
         let html = |page: &CompiledPage, guid: &str| page.html(guid, &starts, &model.table.info, &content);
         let with_guid = |guid: &str| -> Result<Files> {
@@ -281,9 +286,10 @@ impl Builder {
         if !starts.is_empty() {
             model = load(&starts)?;
         }
+        let own = stamp(&own.bytes)?;
         for library in libraries {
             ensure!(
-                stamp(&library.bytes)?.interface() == stamp(&own.bytes)?.interface(),
+                stamp(&library.bytes)?.interface() == own.interface(),
                 "the library for {} has other variables than the model: it was compiled from other sources; compile it again",
                 library.platform
             );

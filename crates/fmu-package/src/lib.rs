@@ -68,7 +68,7 @@ pub use {
     model::LoadedModel,
     options::BuildOptions,
     pack::{Files, Packed, Parts, pack},
-    packages::{cargo, directory_of, metadata, workspace},
+    packages::{cargo, directory_of, metadata},
     page::Page,
     platform::Platform,
     sources::Sources,

@@ -2,7 +2,6 @@
 //! which a new clone compiles that program.
 
 use crate::terminal::fmi_version;
-use clap::builder::ArgPredicate;
 use clap::error::Error;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use fmi_abi::Standard;
@@ -30,7 +29,7 @@ pub struct BuildOptions {
     pub c_sources: bool,
     /// Leave out the page that runs the FMU in a browser.
     pub no_page: bool,
-    /// Time that the model may take for one call while the build checks it, s; by default 60.
+    /// Maximum duration in seconds of one call of the model while the build checks it; 60 if it is `None`.
     pub time_limit: Option<u64>,
     /// Accept a library whose processor differs from its platform.
     pub any_processor: bool,
@@ -96,7 +95,7 @@ impl Args for BuildOptions {
                 "any-processor",
                 "Accept a library whose processor differs from its platform (in FMI 2.0, importers on ARM look in linux64)",
             )
-            .requires_if(ArgPredicate::Equals("true".into()), "binary"),
+            .requires("binary"),
         ])
     }
 

@@ -5,7 +5,8 @@ use anyhow::{Context, Result, bail, ensure};
 use fmi_abi::stamp::Stamp;
 use fmi_abi::{Value, Variability};
 
-/// Returns the index and the value of each start value, except those that the compiled model has in any case. The names and values are these of [`Builder::start`](crate::Builder::start).
+/// Returns the index and the value of each start value in [`Builder::start`](crate::Builder::start). Values that equal the start values of
+/// the compiled model are left out, so that they do not change the FMU.
 ///
 /// # Errors
 /// When there is no such variable, it has no start value, or the value is not one of its type.

@@ -190,8 +190,8 @@ fn the_readme_shows_real_output() {
     assert!(printed.contains("The finding shows.") && readme.contains(&printed), "{printed}");
 }
 
-/// Asserts that a shortened call sequence has few calls, that the reports contain the finding, and that a replay of its calls shows
-/// it with the fault each time, also after it has waited for a debugger, but not in the FMU without the fault.
+/// Asserts that a shortened call sequence has few calls, that the reports contain the finding, and that every replay of its calls shows
+/// it, also one that waits for a debugger. A replay on the FMU without the fault must not show it.
 #[test]
 fn calls_show_it() {
     let directory = TempDir::new().expect("a directory");

@@ -4,6 +4,7 @@ use super::origin::Origin;
 use super::values::check_value;
 use super::{Outcome, State, reject};
 use crate::export::Exported;
+use crate::hash::{EMPTY, fnv1a};
 use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
 use crate::settable::ALL_MODES;
@@ -52,7 +53,7 @@ pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &m
     writer.put(&guid_hash::<M>());
     writer.put(&[origin.byte()]);
     state.visit(&mut writer);
-    checksum.copy_from_slice(&fnv1a(content).to_le_bytes());
+    checksum.copy_from_slice(&fnv1a(EMPTY, content).to_le_bytes());
     Ok(())
 }
 
@@ -73,7 +74,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return reject("the saved state comes from another FMU (its guid differs)");
     }
     let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM_LENGTH);
-    if fnv1a(content).to_le_bytes() != *checksum {
+    if fnv1a(EMPTY, content).to_le_bytes() != *checksum {
         return reject("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
@@ -114,15 +115,7 @@ fn check<M: Exported>(state: &State<M>) -> Outcome {
 /// Identifies the FMU. Depends on the table as well, because all libraries that are not packed have the same guid.
 fn guid_hash<M: Exported>() -> [u8; 8] {
     let stamp = stamp::<M>();
-    fnv1a(&[stamp.interface(), stamp.guid_bytes()].concat()).to_le_bytes()
-}
-
-/// Computes the FNV-1a hash. It detects any single changed byte, because every step maps different hashes to
-/// different hashes.
-fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    fnv1a(fnv1a(EMPTY, stamp.interface()), stamp.guid_bytes()).to_le_bytes()
 }
 
 /// Writes a state to `rest`, or only counts its bytes if there is no `rest`.
