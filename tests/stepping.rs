@@ -1,21 +1,27 @@
 //! Compares the exact step with independent calculations: with eq. (11) instead of the decoupled equations, and with the
 //! matrix exponential of nalgebra instead of the propagator.
 
+use fmu_test_kit::Random;
 use nalgebra::SMatrix;
-use proptest::prelude::*;
 use prw_testbed::pair::PitchRoll;
 use prw_testbed::propagator::{Propagator, StepMatrices};
 use prw_testbed::state_space::state_space;
 use prw_testbed::{BUILT_IN, Parameters, Testbed};
 
-#[allow(non_snake_case, reason = "the paper's symbols")]
-fn parameters() -> impl Strategy<Value = Parameters> {
-    // Each measured parameter of Table 1 is multiplied by a factor from 1/5 to 5. The vector has more exponents than needed.
-    (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
-        let mut exponents = exponents.into_iter();
-        let near = BUILT_IN.varied(|| exponents.next().unwrap());
-        Parameters { M, N, ..near }
-    })
+/// Calls `check` with 256 generators.
+fn for_random_cases(mut check: impl FnMut(&mut Random)) {
+    (0..256).for_each(|seed| check(&mut Random(seed)));
+}
+
+/// Returns random parameters: each measured one of Table 1, multiplied by a factor from 1/5 to 5.
+fn parameters(random: &mut Random) -> Parameters {
+    let near = BUILT_IN.varied(|| random.between(-1.6, 1.6));
+    Parameters { M: 1 + random.below(8) as i32, N: 1 + random.below(14) as i32, ..near }
+}
+
+/// Returns random numbers between `-limit` and `limit`.
+fn array<const N: usize>(random: &mut Random, limit: f64) -> [f64; N] {
+    std::array::from_fn(|_| random.between(-limit, limit))
 }
 
 /// Sets the angles of both motors, and their rates as derivatives.
@@ -39,9 +45,10 @@ fn reference(p: &Parameters, x: [f64; 6], theta: [f64; 2], omega: [f64; 2], h: f
     std::array::from_fn(|i| end[i])
 }
 
-proptest! {
-    #[test]
-    fn decoupled_equations_are_those_of_eq_11(p in parameters()) {
+#[test]
+fn decoupled_equations_are_those_of_eq_11() {
+    for_random_cases(|random| {
+        let p = parameters(random);
         let system = state_space(&p);
         let decoupled = *Testbed::new(p).unwrap().system();
         let (pitch, roll) = (decoupled.pitch, decoupled.roll);
@@ -51,69 +58,68 @@ proptest! {
             for column in 0..3 {
                 let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);
                 let scale = pitch.a[(row, column)].abs() + roll.a[(row, column)].abs() + 1.0;
-                prop_assert!((system.A[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
-                prop_assert!((system.A[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
+                assert!((system.A[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
+                assert!((system.A[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
             }
             for (column, (b_pitch, b_roll)) in
                 [(pitch.b_angle, roll.b_angle), (pitch.b_rate, roll.b_rate)].into_iter().enumerate()
             {
                 let expect = |sign: f64| 0.5 * (b_pitch[row] + sign * b_roll[row]);
                 let scale = b_pitch[row].abs() + b_roll[row].abs() + 1.0;
-                prop_assert!((system.B[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
-                prop_assert!((system.B[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
+                assert!((system.B[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
+                assert!((system.B[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
             }
         }
-    }
+    });
+}
 
-    #[test]
-    fn steps_are_exact(
-        p in parameters(),
-        x in prop::array::uniform6(-1.0..1.0f64),
-        theta in prop::array::uniform2(-1.0..1.0f64),
-        omega in prop::array::uniform2(-10.0..10.0f64),
-        exponent in -6.0..0.3f64,
-    ) {
-        let h = 10f64.powf(exponent);
+#[test]
+fn steps_are_exact() {
+    for_random_cases(|random| {
+        let p = parameters(random);
+        let x: [f64; 6] = array(random, 1.0);
+        let (theta, omega) = (array(random, 1.0), array(random, 10.0));
+        let h = 10f64.powf(random.between(-6.0, 0.3));
         let mut testbed = Testbed::new(p).unwrap();
         testbed.state = x;
         sample(&mut testbed, theta, omega);
-        prop_assert!(testbed.step(h));
+        assert!(testbed.step(h));
         for (found, expected) in testbed.state.iter().zip(reference(&p, x, theta, omega, h)) {
             let scale = expected.abs().max(30.0); // velocities reach tens of rad/s
-            prop_assert!((found - expected).abs() < 1e-11 * scale, "{found} {expected}");
+            assert!((found - expected).abs() < 1e-11 * scale, "{found} {expected}");
         }
-    }
+    });
+}
 
-    #[test]
-    fn two_steps_are_one(p in parameters(), split in 0.01..0.99f64) {
+#[test]
+fn two_steps_are_one() {
+    for_random_cases(|random| {
+        let (p, split) = (parameters(random), random.between(0.01, 0.99));
         let (h, omega) = (0.02, [3.0, -1.0]);
         let mut once = Testbed::new(p).unwrap();
         sample(&mut once, [0.0; 2], omega);
         let mut twice = once.clone();
-        prop_assert!(once.step(h) && twice.step(h * split));
+        assert!(once.step(h) && twice.step(h * split));
         sample(&mut twice, omega.map(|w| w * h * split), omega);
-        prop_assert!(twice.step(h - h * split));
+        assert!(twice.step(h - h * split));
         for (a, b) in once.state.iter().zip(twice.state) {
-            prop_assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()));
+            assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()));
         }
-    }
+    });
+}
 
-    /// Checks that fast steps and general steps are bit-identical, even if rates are set as derivatives or come from omega.
-    #[test]
-    fn fast_steps_are_steps(
-        p in parameters(),
-        uses_omega in any::<bool>(),
-        steps in prop::collection::vec(
-            (prop::array::uniform2(-1.0..1.0f64), prop::array::uniform2(prop::option::weighted(0.2, -9.0..9.0f64)), 0..8),
-            4..30,
-        ),
-    ) {
-        let mut testbed = Testbed::new(p).unwrap();
-        testbed.motors.use_omega = uses_omega;
+/// Checks that fast steps and general steps are bit-identical, even if rates are set as derivatives or come from omega.
+#[test]
+fn fast_steps_are_steps() {
+    let mut fast = 0;
+    for_random_cases(|random| {
+        let mut testbed = Testbed::new(parameters(random)).unwrap();
+        testbed.motors.use_omega = random.chance(0.5);
         testbed.motors.use_omega_changed();
         let mut other = testbed.clone();
-        let mut fast = 0;
-        for (theta, rates, size) in steps {
+        for _ in 0..4 + random.below(26) {
+            let (theta, size) = (array::<2>(random, 1.0), random.below(8));
+            let rates = [(); 2].map(|()| random.chance(0.2).then(|| random.between(-9.0, 9.0)));
             for testbed in [&mut testbed, &mut other] {
                 for motor in 0..2 {
                     testbed.motors.set_theta(motor, theta[motor]);
@@ -131,23 +137,27 @@ proptest! {
             if testbed.step_fast(h).is_some() {
                 fast += 1;
             } else {
-                prop_assert!(testbed.step(h));
+                assert!(testbed.step(h));
             }
-            prop_assert!(other.step(h));
-            prop_assert_eq!(testbed.state.map(f64::to_bits), other.state.map(f64::to_bits));
-            prop_assert_eq!(testbed.motors, other.motors);
+            assert!(other.step(h));
+            assert_eq!(testbed.state.map(f64::to_bits), other.state.map(f64::to_bits));
+            assert_eq!(testbed.motors, other.motors);
         }
-        prop_assume!(fast > 0);
-    }
+    });
+    assert!(fast > 500, "{fast}");
+}
 
-    /// Checks that step matrices are computed once for each of up to 8 step sizes, even if states are saved and restored in
-    /// between, and that steps use the matrices of their size. The times are grids like `np.arange(n) * 1e-3`, whose
-    /// differences vary in their last digits.
-    #[test]
-    fn matrices_are_computed_once_for_each_size(p in parameters(), dt in 1e-5..1e-2f64, first in 1..5000_i32) {
+/// Checks that step matrices are computed once for each of up to 8 step sizes, even if states are saved and restored in
+/// between, and that steps use the matrices of their size. The times are grids like `np.arange(n) * 1e-3`, whose
+/// differences vary in their last digits.
+#[test]
+fn matrices_are_computed_once_for_each_size() {
+    for_random_cases(|random| {
+        let (p, dt) = (parameters(random), random.between(1e-5, 1e-2));
+        let first = 1 + random.below(4999) as i32;
         let size = |k: i32| f64::from(k + 1) * dt - f64::from(k) * dt;
         let mut testbed = Testbed::new(p).unwrap();
-        prop_assert!(testbed.step(dt));
+        assert!(testbed.step(dt));
         // A changed parameter discards the matrices but keeps the memory allocated for the next ones.
         testbed.parameters.k1 *= 1.5;
         testbed.parameters_changed().unwrap();
@@ -158,11 +168,11 @@ proptest! {
                 // A fresh copy computes its matrices again, which is slow, so only every eighth step is compared with one.
                 let mut fresh = (k % 8 == 0).then(|| testbed.clone());
                 testbed.motors.set_theta(0, 0.01 * f64::from(k % 7));
-                prop_assert!(testbed.step(size(k)));
+                assert!(testbed.step(size(k)));
                 if let Some(fresh) = &mut fresh {
                     fresh.motors.set_theta(0, 0.01 * f64::from(k % 7));
-                    prop_assert!(fresh.step(size(k)));
-                    prop_assert_eq!(testbed.state.map(f64::to_bits), fresh.state.map(f64::to_bits));
+                    assert!(fresh.step(size(k)));
+                    assert_eq!(testbed.state.map(f64::to_bits), fresh.state.map(f64::to_bits));
                 }
                 if !sizes.contains(&size(k)) {
                     sizes.push(size(k));
@@ -171,31 +181,40 @@ proptest! {
                 let saved = testbed.clone();
                 testbed.copy_from(&saved);
             }
-            prop_assume!(sizes.len() <= 8);
-            prop_assert_eq!(testbed.computed_matrices() - before, sizes.len() as u64);
+            if sizes.len() <= 8 {
+                assert_eq!(testbed.computed_matrices() - before, sizes.len() as u64);
+            }
         }
-    }
+    });
+}
 
-    /// Checks that the step matrices, in which pitch and roll are calculated together, equal the propagators of pitch and roll.
-    #[test]
-    fn pairs_of_propagators_are_propagators(p in parameters(), exponent in -6.0..-3.0f64) {
-        let h = 10f64.powf(exponent);
+/// Checks that the step matrices, in which pitch and roll are calculated together, equal the propagators of pitch and roll.
+#[test]
+fn pairs_of_propagators_are_propagators() {
+    let mut compared = 0;
+    for_random_cases(|random| {
+        let (p, h) = (parameters(random), 10f64.powf(random.between(-6.0, -3.0)));
         let system = *Testbed::new(p).unwrap().system();
         let matrices = StepMatrices::new(&system, h);
-        prop_assume!(matrices.remaining_velocity(PitchRoll::both(1.0)).is_none());
+        if matrices.remaining_velocity(PitchRoll::both(1.0)).is_some() {
+            return;
+        }
+        compared += 1;
         let [pitch, roll] = [system.pitch, system.roll].map(|subsystem| Propagator::new(&subsystem, h));
         let zero = PitchRoll::both(0.0);
         for column in 0..3 {
             let mut unit = [zero; 3];
             unit[column] = PitchRoll::both(2.0);
             for (row, found) in matrices.increment(&unit, zero, zero).into_iter().enumerate() {
-                prop_assert_eq!(found.array(), [pitch.growth[(row, column)], roll.growth[(row, column)]]);
+                assert_eq!(found.array(), [pitch.growth[(row, column)], roll.growth[(row, column)]]);
             }
         }
-        for (row, found) in matrices.increment(&[zero; 3], PitchRoll::both(2.0), zero).into_iter().enumerate() {
-            prop_assert_eq!(found.array(), [pitch.ramp[row], roll.ramp[row]]);
+        for (row, found) in matrices.increment(&[zero; 3], PitchRoll::both(2.0), zero).into_iter().enumerate()
+        {
+            assert_eq!(found.array(), [pitch.ramp[row], roll.ramp[row]]);
         }
-    }
+    });
+    assert!(compared > 100, "{compared}");
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! The output of `build_fmu`: the description, its variants, the FMU.
 
+use fmi_abi::description::{ModelDescription, Unknown};
 use fmi_abi::stamp::Stamp;
-use fmi_schema::fmi2::{Fmi2ModelDescription, Fmi2VariableDependency};
-use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
 use fmu_package::files::unzip;
 use fmu_run::{Batch, Watch};
@@ -54,12 +53,12 @@ fn the_committed_description_is_up_to_date() {
 
 #[test]
 fn it_reads_back_as_the_model_that_was_compiled() {
-    let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
+    let read = ModelDescription::parse(&description(&[])).unwrap();
     // The description that is kept with the sources has no guid, because the guid changes whenever they do.
-    assert_eq!(read.guid, fmu_package::NO_GUID);
+    assert_eq!(read.token, fmu_package::NO_GUID);
     assert_eq!(read.model_name, "PitchRollWristTestbed");
-    assert_eq!(read.num_states(), 6);
-    let names: Vec<&str> = read.get_model_variables().map(|variable| variable.name.as_str()).collect();
+    assert_eq!(read.derivatives.len(), 6);
+    let names: Vec<&str> = read.variables.iter().map(|variable| variable.name.as_str()).collect();
     let table: Vec<&str> = TestbedFmu::TABLE.iter().map(|variable| variable.name()).collect();
     assert_eq!(names, table);
 }
@@ -117,28 +116,28 @@ const INITIAL_DEPENDENCIES: [(&str, &[&str]); 11] = [
 /// independent code calculates.
 #[test]
 fn dependencies_are_the_sparsity_of_the_matrices() {
-    let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
-    let name = |index: u32| read.model_variables.variables[index as usize - 1].name.as_str();
-    let listed = |list: &[Fmi2VariableDependency], unknown: &str| -> BTreeSet<String> {
-        let Some(entry) = list.iter().find(|entry| name(entry.index) == unknown) else {
+    let read = ModelDescription::parse(&description(&[])).unwrap();
+    let name = |index: usize| read.variables[index].name.as_str();
+    let listed = |list: &[Unknown], unknown: &str| -> BTreeSet<String> {
+        let Some(entry) = list.iter().find(|entry| name(entry.variable) == unknown) else {
             panic!("{unknown} is not listed");
         };
-        assert_eq!(entry.dependencies.len(), entry.dependencies_kind.len());
-        assert!(entry.dependencies.is_sorted());
-        entry.dependencies.iter().map(|index| name(*index).to_owned()).collect()
+        let dependencies = entry.dependencies.as_ref().unwrap();
+        assert_eq!(dependencies.len(), entry.kinds.len());
+        assert!(dependencies.is_sorted());
+        dependencies.iter().map(|index| name(*index).to_owned()).collect()
     };
     let inputs = ["theta1", "theta2", "omega1", "omega2"];
     let states = ["theta3", "theta4", "theta5", "theta6", "omega5", "omega6"];
     let StateSpace { A, B, C, D } = state_space(&BUILT_IN);
     let owned = |set: BTreeSet<&str>| set.into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
 
-    let structure = &read.model_structure;
     for (row, state) in states.iter().enumerate() {
         let expected = nonzero_names(
             [&states, &inputs],
             [A.row(row).iter().copied().collect(), B.row(row).iter().copied().collect()],
         );
-        assert_eq!(listed(&structure.derivatives.unknowns, &format!("der({state})")), owned(expected));
+        assert_eq!(listed(&read.derivatives, &format!("der({state})")), owned(expected));
     }
     // y of eq. (11) is theta3, theta4, theta1, theta2, tau1, tau2.
     for (row, output) in [(0, "theta3"), (1, "theta4"), (4, "tau1"), (5, "tau2")] {
@@ -146,7 +145,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
             [&states, &inputs],
             [C.row(row).iter().copied().collect(), D.row(row).iter().copied().collect()],
         );
-        assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected));
+        assert_eq!(listed(&read.outputs, output), owned(expected));
     }
     for (output, expected) in [
         ("pitch", ["theta5", "theta6"]),
@@ -154,13 +153,13 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
         ("pitch_rate", ["omega5", "omega6"]),
         ("roll_rate", ["omega5", "omega6"]),
     ] {
-        assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
+        assert_eq!(listed(&read.outputs, output), owned(expected.into()));
     }
     for (unknown, expected) in INITIAL_DEPENDENCIES {
         let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
-        assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
+        assert_eq!(listed(&read.initial_unknowns, unknown), owned(expected));
     }
-    assert_eq!(structure.initial_unknowns.unknowns.len(), 18);
+    assert_eq!(read.initial_unknowns.len(), 18);
 }
 
 #[test]
@@ -237,7 +236,7 @@ fn every_variant_has_a_separate_guid() {
 
 fn guid(fmu: &[u8]) -> String {
     let description = String::from_utf8(unzip(fmu, "modelDescription.xml").unwrap()).unwrap();
-    Fmi2ModelDescription::deserialize(&description).unwrap().guid
+    ModelDescription::parse(&description).unwrap().token
 }
 
 #[test]

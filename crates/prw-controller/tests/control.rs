@@ -1,6 +1,6 @@
 //! The control law with a rigid or blocked wrist, with sensors that have an offset or are stuck, and with random inputs.
 
-use proptest::prelude::*;
+use fmu_test_kit::Random;
 use prw_controller::controller::{Controller, Inputs};
 use prw_controller::motor::MotorSetpoint;
 use prw_controller::parameters::Parameters;
@@ -193,42 +193,45 @@ fn invalid_parameters_are_rejected() {
     assert_eq!(c.schedule.next, 0.0);
 }
 
-/// Generates any finite number that an importer can set, including the largest ones.
-fn any_input() -> impl Strategy<Value = f64> {
-    prop_oneof![8 => -3.0..3.0, 1 => -1e308..1e308, 1 => Just(f64::MAX), 1 => Just(-f64::MAX)]
+/// Draws any finite number that an importer can set, including the largest ones.
+fn any_input(random: &mut Random) -> f64 {
+    match random.below(11) {
+        0 => random.between(-1.0, 1.0) * 1e308,
+        1 => f64::MAX,
+        2 => -f64::MAX,
+        _ => random.between(-3.0, 3.0),
+    }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
-
-    /// Checks for any inputs and steps that values are finite and within their limits, and that omega is the derivative of
-    /// theta.
-    #[test]
-    fn limits_hold_and_rates_are_derivatives(
-        inputs in prop::collection::vec(prop::array::uniform8(any_input()), 1..20),
-        step in 0.1e-3..5e-3_f64,
-        rate in 0.1..10.0_f64,
-        acceleration in 1.0..100.0_f64,
-    ) {
+/// Checks for any inputs and steps that values are finite and within their limits, and that omega is the derivative of
+/// theta.
+#[test]
+fn limits_hold_and_rates_are_derivatives() {
+    for seed in 0..200 {
+        let random = &mut Random(seed);
+        let [step, rate] = [random.between(0.1e-3, 5e-3), random.between(0.1, 10.0)];
+        let acceleration = random.between(1.0, 100.0);
         let mut c = controller(|p| (p.max_rate, p.max_acceleration) = (rate, acceleration));
         let mut time = 0.0;
-        for values in inputs {
+        for _ in 0..1 + random.below(19) {
+            let mut pair = || std::array::from_fn(|_| any_input(random));
+            c.inputs = Inputs { reference: pair(), angle: pair(), rate: pair(), torque: pair() };
             for _ in 0..20 {
-                let [a, b, d, e, f, g, i, j] = values;
-                c.inputs = Inputs { reference: [a, b], angle: [d, e], rate: [f, g], torque: [i, j] };
                 let before = c.motion();
-                prop_assert!(c.step(time, step));
+                assert!(c.step(time, step));
                 time += step;
                 for (old, new) in before.iter().zip(c.motion()) {
-                    prop_assert!(new.angle.is_finite());
-                    prop_assert!(new.rate.abs() <= rate * (1.0 + 1e-9), "{new:?}");
-                    prop_assert!((new.rate - old.rate).abs() <= acceleration * step * (1.0 + 1e-9) + 1e-12);
+                    assert!(new.angle.is_finite(), "seed {seed}: {new:?}");
+                    assert!(new.rate.abs() <= rate * (1.0 + 1e-9), "seed {seed}: {new:?}");
+                    let limit = acceleration * step * (1.0 + 1e-9) + 1e-12;
+                    assert!((new.rate - old.rate).abs() <= limit, "seed {seed}: {old:?} {new:?}");
                     // The mean of both rates gives the exact change of the angle if the step is within one sample period,
                     // and nearly the exact one otherwise.
                     let mean = 0.5 * (old.rate + new.rate) * step;
-                    prop_assert!((new.angle - old.angle - mean).abs() <= acceleration * step * step + 1e-9);
+                    let limit = acceleration * step * step + 1e-9;
+                    assert!((new.angle - old.angle - mean).abs() <= limit, "seed {seed}: {old:?} {new:?}");
                 }
-                prop_assert!(c.correction.iter().all(|x| x.abs() <= 0.2));
+                assert!(c.correction.iter().all(|x| x.abs() <= 0.2), "seed {seed}: {:?}", c.correction);
             }
         }
     }

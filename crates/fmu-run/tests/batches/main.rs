@@ -6,7 +6,7 @@ mod built;
 
 use built::Recorded;
 use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
-use proptest::prelude::*;
+use fmu_test_kit::Random;
 
 /// Manners of the FMU, which determine which values survive a reset, and whether the reset or the comparison of instances fails.
 /// Creating a "slow" instance takes long; only slow instances are reset.
@@ -137,40 +137,44 @@ fn found(runs: &Runs, times: usize) -> Vec<Expected> {
     found.collect()
 }
 
-fn value() -> impl Strategy<Value = f64> {
-    prop_oneof![8 => -4.0..4.0, 1 => Just(0.0), 1 => Just(f64::NAN)]
-}
-
-fn case(times: usize) -> impl Strategy<Value = Case> {
+fn case(random: &mut Random, times: usize) -> Case {
     // Some values are frequent, so that successive runs often differ in only one parameter.
-    let parameter = || prop_oneof![Just(0.0), Just(1.0), Just(2.5), -3.0..3.0];
-    let fails = prop_oneof![4 => Just(None), 1 => (0..times).prop_map(Some)];
-    let u =
-        prop_oneof![2 => prop::collection::vec(-4.0..4.0, times), 1 => prop::collection::vec(value(), times)];
-    (parameter(), parameter(), fails, u).prop_map(|(factor, bias, fails, u)| Case { factor, bias, fails, u })
+    let parameter = |random: &mut Random| match random.below(4) {
+        0 => 0.0,
+        1 => 1.0,
+        2 => 2.5,
+        _ => random.between(-3.0, 3.0),
+    };
+    let (factor, bias) = (parameter(random), parameter(random));
+    let fails = random.chance(0.2).then(|| random.below(times));
+    // A third of the inputs contain zeros and NaN.
+    let is_special = random.chance(1.0 / 3.0);
+    let u = (0..times).map(|_| match random.below(10) {
+        0 if is_special => 0.0,
+        1 if is_special => f64::NAN,
+        _ => random.between(-4.0, 4.0),
+    });
+    Case { factor, bias, fails, u: u.collect() }
 }
 
-/// A batch: cases with the same number of times, the number of threads, and whether the bias is set.
-fn batch() -> impl Strategy<Value = (Vec<Case>, usize, bool)> {
-    let cases = (2..9_usize).prop_flat_map(|times| prop::collection::vec(case(times), 1..7));
-    (cases, 1..4_usize, any::<bool>())
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
-
-    /// Successive batches have the same results as runs in new instances, even if some runs fail or have NaN.
-    #[test]
-    fn runs_are_independent(batches in prop::collection::vec(batch(), 1..12), manner in 0..MANNERS.len()) {
-        let recorded = Recorded::open(MANNERS[manner], "");
-        for (cases, threads, has_bias) in &batches {
-            let expected: Vec<_> = cases.iter().map(|case| case.expected(*has_bias)).collect();
-            prop_assert_eq!(run(&recorded, cases, *threads, *has_bias), expected, "{}", MANNERS[manner]);
+/// Successive batches have the same results as runs in new instances, even if some runs fail or have NaN.
+#[test]
+fn runs_are_independent() {
+    for seed in 0..60 {
+        let random = &mut Random(seed);
+        let manner = MANNERS[random.below(MANNERS.len())];
+        let mut recorded = Recorded::open(manner, "");
+        for _ in 0..1 + random.below(11) {
+            // A batch: cases with the same number of times, the number of threads, and whether the bias is set.
+            let times = 2 + random.below(7);
+            let cases: Vec<_> = (0..1 + random.below(6)).map(|_| case(random, times)).collect();
+            let (threads, has_bias) = (1 + random.below(3), random.chance(0.5));
+            let expected: Vec<_> = cases.iter().map(|case| case.expected(has_bias)).collect();
+            assert_eq!(run(&recorded, &cases, threads, has_bias), expected, "{manner}, seed {seed}");
         }
-        let mut recorded = recorded;
         drop(recorded.fmu.take());
         let [made, _, freed] = recorded.counts();
-        prop_assert_eq!(made, freed);
+        assert_eq!(made, freed, "{manner}, seed {seed}");
     }
 }
 
