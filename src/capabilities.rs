@@ -9,9 +9,9 @@ use crate::start::Start;
 use crate::testbed::{State, Testbed, split_by_side};
 use crate::variables::Name;
 use fmu_export::{
-    BaseType, Causality, CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives,
-    Interface, Model, ModelExchange, OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped,
-    Variables, info, saved,
+    BaseType, Causality, CoSimulation, DefaultExperiment, Error, Experiment, FastSteps, Info,
+    InputDerivatives, Interface, Model, ModelExchange, OutputDerivatives, Partials, Saved, Setup,
+    StateVisitor, Step, Stepped, Variables, info, saved,
 };
 use std::borrow::Cow;
 
@@ -100,7 +100,9 @@ impl CoSimulation for TestbedFmu {
         self.start.is_over = true;
         Ok(Stepped::Calculated)
     }
+}
 
+impl FastSteps for TestbedFmu {
     #[inline(always)]
     fn step_fast(&mut self, size: f64) -> bool {
         let state = self.testbed.step_fast(size);
@@ -124,28 +126,6 @@ impl ModelExchange for TestbedFmu {
         self.start.is_over = true;
     }
 }
-
-/// Defines the derivatives of variables that are not linear functions of the states and of the motor motion, such as a
-/// mechanical power (torque times rate). Linear variables need only a name in `moving_variables!`, because their partial
-/// derivatives do not depend on the state. Any other Real variable needs a line here, which calculates its change from
-/// the current [`Moving`] values and their changes; for a product `a * b` it is `now.a * change.b + change.a * now.b`.
-macro_rules! products {
-    ($($name:ident = |$now:ident, $change:ident| $value:expr;)*) => {
-        const PRODUCTS: &[Name] = &[$(Name::$name),*];
-
-        #[allow(unused_variables, reason = "there may be no products")]
-        fn change_of_product(of: Name, now: &Moving, change: &Moving) -> Option<f64> {
-            match of {
-                $(Name::$name => {
-                    let ($now, $change) = (now, change);
-                    Some($value)
-                })*
-                _ => None,
-            }
-        }
-    };
-}
-products! {}
 
 macro_rules! names {
     ($($name:ident)+) => { [$(Name::$name),+] };
@@ -171,17 +151,10 @@ const _: () = {
         let variable = &TestbedFmu::TABLE[line];
         let has_derivatives = matches!(variable.base(), BaseType::Real)
             && matches!(variable.causality(), Causality::Input | Causality::Output | Causality::Local);
-        let mut is_known = POSITIONS[line] < MOVING.len();
-        let mut product = 0;
-        while product < PRODUCTS.len() {
-            is_known |= PRODUCTS[product] as usize == line;
-            product += 1;
-        }
-        if has_derivatives && !is_known {
+        if has_derivatives && POSITIONS[line] == MOVING.len() {
             fmu_export::reject(
                 variable.name(),
-                "it has no derivatives; add its name to moving_variables! in fmu.rs, or its change to products! in \
-                 capabilities.rs",
+                "it has no derivatives; add its name to moving_variables! in fmu.rs",
             );
         }
         line += 1;
@@ -203,7 +176,7 @@ impl InputDerivatives for TestbedFmu {
 impl OutputDerivatives for TestbedFmu {
     fn output_derivative(&self, of: Name, _: u32) -> f64 {
         let rates = self.moving(&self.now().rates(self.system()));
-        self.change(of, &rates.into(), None).unwrap_or(f64::NAN)
+        change(of, &rates.into()).unwrap_or(f64::NAN)
     }
 }
 
@@ -224,34 +197,18 @@ impl Partials for TestbedFmu {
     ) -> impl Fn((Name, usize)) -> Option<f64> {
         let known = known.map(|(known, _)| known);
         let sensitivities = self.sensitivities(known);
-        move |(unknown, _)| self.change(unknown, &sensitivities, known)
+        move |(unknown, _)| change(unknown, &sensitivities)
     }
 }
 
+/// Returns the change of a variable if the [`Moving`](crate::fmu::Moving) variables change by `row`, because a known is set or because
+/// time passes.
+#[inline(always)]
+fn change(of: Name, row: &Row) -> Option<f64> {
+    row.get(POSITIONS[of as usize]).copied()
+}
+
 impl TestbedFmu {
-    /// Returns the change of a variable if the [`Moving`] variables change by `row`, because a known is set or because time
-    /// passes.
-    #[inline(always)]
-    fn change(&self, of: Name, row: &Row, known: Option<Name>) -> Option<f64> {
-        match row.get(POSITIONS[of as usize]) {
-            None if PRODUCTS.is_empty() => None,
-            None => change_of_product(of, &self.moving(&self.set_again(known)), &(*row).into()),
-            change => change.copied(),
-        }
-    }
-
-    /// Returns the state and the motor motion after a known has been set to its current value. Even this has an effect:
-    /// an angle becomes a new sample, and a rate takes effect.
-    #[cold]
-    fn set_again(&self, known: Option<Name>) -> Instant {
-        let Some(known) = known else { return self.now() };
-        let (mut again, variable) = (self.clone(), &Self::TABLE[Self::index(known)]);
-        if let Some(value) = variable.value(self) {
-            variable.set(&mut again, &value);
-        }
-        again.now()
-    }
-
     /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
     /// which no variable depends explicitly.
     #[inline(never)]

@@ -54,12 +54,6 @@ macro_rules! moving {
                 [$(moving.$name),+]
             }
         }
-
-        impl From<Row> for Moving {
-            fn from([$($name),+]: Row) -> Self {
-                Self { $($name),+ }
-            }
-        }
     };
 }
 moving_variables!(moving);

@@ -73,5 +73,5 @@ pub use testbed::Testbed;
 pub const BUILT_IN: Parameters = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 
 fmu_export::export_fmu!(
-    TestbedFmu: CoSimulation + ModelExchange + InputDerivatives + OutputDerivatives + Partials
+    TestbedFmu: CoSimulation + FastSteps + ModelExchange + InputDerivatives + OutputDerivatives + Partials
 );

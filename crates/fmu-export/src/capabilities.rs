@@ -35,21 +35,22 @@ pub trait CoSimulation: Model {
     /// Fails if the step cannot be carried out. This crate then undoes the step, so `step` may fail after it has
     /// changed the model, unless the model declares [`ATOMIC_STEP`](Self::ATOMIC_STEP).
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
+}
 
+/// Fast paths for the usual steps of a model whose steps cannot end early. They are worthwhile only if a step takes a few
+/// hundred instructions, of which they save about 30.
+pub trait FastSteps: CoSimulation {
     /// Makes a step of this size, s, and calculates like [`calculate`](Model::calculate), if the model can do both
-    /// fast, and without events or messages. The result must equal the result of [`step`](Self::step). In all other
-    /// cases the function must return false and change nothing; this crate then calls
+    /// fast, and without events or messages. The result must equal the result of [`step`](CoSimulation::step). In all
+    /// other cases the function must return false and change nothing; this crate then calls
     /// [`step_any_size`](Self::step_any_size).
     ///
-    /// This crate calls it only after the first `step`, and only if steps cannot end early. Because it is inlined
-    /// into the C function, it should handle only the most frequent steps, and call only functions that are inlined.
-    #[inline]
-    fn step_fast(&mut self, _size: f64) -> bool {
-        false
-    }
+    /// This crate calls it only after the first `step`. Because it is inlined into the C function, it should handle only
+    /// the most frequent steps, and call only functions that are inlined.
+    fn step_fast(&mut self, size: f64) -> bool;
 
     /// Does the same for steps that [`step_fast`](Self::step_fast) does not handle, such as a step of another size
-    /// than the last. If it also returns false, this crate calls [`step`](Self::step).
+    /// than the last. If it also returns false, this crate calls [`step`](CoSimulation::step).
     #[inline]
     fn step_any_size(&mut self, _size: f64) -> bool {
         false

@@ -12,6 +12,8 @@ pub trait Exported: Model {
     const CO_SIMULATION: Option<CoSimulationOffer> = None;
     /// Capabilities in Model Exchange; `None` if the model does not support it.
     const MODEL_EXCHANGE: Option<ModelExchangeOffer> = None;
+    /// Whether the model has fast paths for its usual steps.
+    const FAST_STEPS: bool = false;
     /// Whether the model provides partial derivatives.
     const PARTIALS: bool = false;
     /// Whether the model uses input derivatives.
@@ -163,15 +165,18 @@ macro_rules! offer {
             }
             stepped
         }
+    };
+    (@capability FastSteps) => {
+        const FAST_STEPS: bool = true;
 
         #[inline(always)]
         fn exported_step_fast(&mut self, size: f64) -> bool {
-            $crate::CoSimulation::step_fast(self, size)
+            $crate::FastSteps::step_fast(self, size)
         }
 
         #[inline(always)]
         fn exported_step_any_size(&mut self, size: f64) -> bool {
-            $crate::CoSimulation::step_any_size(self, size)
+            $crate::FastSteps::step_any_size(self, size)
         }
     };
     (@capability ModelExchange) => {
@@ -234,8 +239,8 @@ macro_rules! offer {
     };
     (@capability $other:ident) => {
         ::core::compile_error!(::core::concat!(
-            ::core::stringify!($other), " is not a capability: there are CoSimulation, ModelExchange, Partials, \
-             InputDerivatives and OutputDerivatives"
+            ::core::stringify!($other), " is not a capability: there are CoSimulation, FastSteps, ModelExchange, \
+             Partials, InputDerivatives and OutputDerivatives"
         ));
     };
 
@@ -258,6 +263,7 @@ macro_rules! offer {
                 );
             }
             $crate::offer! { @must_agree $model, CoSimulation, CO_SIMULATION.is_some() }
+            $crate::offer! { @must_agree $model, FastSteps, FAST_STEPS }
             $crate::offer! { @must_agree $model, ModelExchange, MODEL_EXCHANGE.is_some() }
             $crate::offer! { @must_agree $model, Partials, PARTIALS }
             $crate::offer! { @must_agree $model, InputDerivatives, INPUT_DERIVATIVES }

@@ -38,8 +38,8 @@ mod value;
 mod variable;
 
 pub use capabilities::{
-    CoSimulation, Event, Events, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step,
-    StepCompleted, Stepped,
+    CoSimulation, Event, Events, FastSteps, InputDerivatives, ModelExchange, OutputDerivatives, Partials,
+    Step, StepCompleted, Stepped,
 };
 pub use describe::describe;
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 /// | set parameters | as above, then [`update`](Self::update) once; an error undoes the change |
 /// | enter initialization | [`initialize`](Self::initialize), undone after an error. If a start value was rejected and not set again, the importer gets an error and the model is not called |
 /// | get | [`calculate`](Self::calculate), if a value, the state or the time has changed since its last call; then the `by` of the table |
-/// | step | [`CoSimulation::step_fast`](crate::CoSimulation::step_fast), then [`step_any_size`](crate::CoSimulation::step_any_size) and [`step`](crate::CoSimulation::step), until one of them makes the step; an error undoes it |
+/// | step | [`CoSimulation::step`](crate::CoSimulation::step), after [`FastSteps`](crate::FastSteps) if the model has them; an error undoes it |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event); an error undoes it |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone` or `clone_from` |

@@ -119,8 +119,10 @@ impl CoSimulation for Meter {
         }
         Ok(Stepped::Done)
     }
+}
 
-    /// Only steps of size 1 are fast.
+/// Only steps of size 1 are fast.
+impl FastSteps for Meter {
     fn step_fast(&mut self, size: f64) -> bool {
         if size != 1.0 {
             return false;
@@ -161,4 +163,4 @@ impl Partials for Meter {
     }
 }
 
-offer!(Meter: CoSimulation + ModelExchange + Partials);
+offer!(Meter: CoSimulation + FastSteps + ModelExchange + Partials);
