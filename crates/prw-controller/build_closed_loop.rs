@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use clap::Parser;
 use fmu_package::directory_of;
 use fmu_package::terminal::{exit, short};
-use fmu_system::System;
+use fmu_run::SystemStructure;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,7 +50,7 @@ fn run(options: &Options) -> Result<()> {
     let directory = directory_of("prw_testbed")?.join("target/fmu");
     let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| directory.join(name));
     let [pitch, roll] = [0, 1].map(|axis| options.go_to[axis] * PI / 180.0);
-    let system = System {
+    let system = SystemStructure {
         name: "prw_closed_loop",
         description: "The pitch-roll wrist testbed with its controller",
         components: vec![

@@ -2,8 +2,8 @@
 
 use fmi_abi::description::{ModelDescription, Unknown};
 use fmi_abi::stamp::Stamp;
+use fmi_abi::write::unzip;
 use fmu_export::Variables;
-use fmu_package::files::unzip;
 use fmu_run::{Batch, Watch};
 use prw_testbed::state_space::{StateSpace, state_space};
 use prw_testbed::{BUILT_IN, TestbedFmu};

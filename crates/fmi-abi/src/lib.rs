@@ -20,6 +20,8 @@ mod standard;
 mod status;
 mod text;
 mod value;
+#[cfg(feature = "write")]
+pub mod write;
 #[cfg(feature = "description")]
 pub mod xml;
 

@@ -5,7 +5,6 @@ use crate::cargo::LibraryBuild;
 use crate::connectors::{Terminal, terminals};
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::describe::{Changes, describe};
-use crate::files::write_atomically;
 use crate::library::{Library, check_platform, needed_glibc, stamp, with_stamp};
 use crate::model::LoadedModel;
 use crate::options::BuildOptions;
@@ -18,10 +17,11 @@ use crate::sources::{DESCRIPTION, Sources};
 use crate::starts::indexed_starts;
 use crate::terminal::{exit, short};
 use crate::universal::join_for_macos;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Error, Result, bail, ensure};
 use clap::FromArgMatches;
 use fmi_abi::Standard;
 use fmi_abi::stamp::NO_GUID;
+use fmi_abi::write::write_atomically;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
@@ -378,7 +378,7 @@ fn write_description(path: &Path, description: &str) -> Result<()> {
         println!("{} is up to date", short(path));
         return Ok(());
     }
-    write_atomically(path, |file| Ok(file.write_all(description.as_bytes())?))?;
+    write_atomically(path, |file| file.write_all(description.as_bytes())).map_err(Error::msg)?;
     println!("{} written", short(path));
     Ok(())
 }

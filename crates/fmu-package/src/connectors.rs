@@ -3,9 +3,9 @@
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
 use crate::model::LoadedModel;
-use crate::xml::Element;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::Causality;
+use fmi_abi::write::Element;
 use std::collections::HashSet;
 
 /// A terminal of an FMU for FMI 3.0: a connector with variables as its members.
@@ -185,5 +185,5 @@ pub fn terminals(
     let Some(list) = list("Terminals", terminals.iter().map(Terminal::element)) else { return Ok(None) };
     // FMI 3.0 defines this file, so an FMU for FMI 2.0 would have this version as well (section 2.4.9 of FMI 3.0).
     let root = Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0");
-    root.containing([list]).document().map(Some)
+    Ok(Some(root.containing([list]).document()?))
 }

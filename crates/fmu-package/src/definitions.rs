@@ -1,9 +1,9 @@
 //! Definitions of units and types (sections 2.2.2 and 2.2.3 of FMI 2.0, 2.4.3 and 2.4.4 of FMI 3.0).
 
 use crate::table::{Attributes, Type, Unit};
-use crate::xml::Element;
 use anyhow::{Result, ensure};
 use fmi_abi::Value;
+use fmi_abi::write::Element;
 
 /// Returns the element with the units of these types, in the order of their first use; `None` if there are none.
 ///

@@ -9,9 +9,9 @@ use crate::definitions::{
 use crate::model::LoadedModel;
 use crate::structure::{ModelStructure, Unknown, checked_starts};
 use crate::table::{CoSimulation, ModelExchange, Table, Type, Variable};
-use crate::xml::Element;
 use anyhow::{Result, bail, ensure};
 use fmi_abi::stamp::NO_GUID;
+use fmi_abi::write::Element;
 use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
 
 /// Values of the description that differ from the compiled model.
@@ -91,7 +91,7 @@ impl Description<'_> {
             Some(Element::new("ModelVariables").containing(variables)),
             Some(self.structure(structure)),
         ];
-        self.root().containing(children.into_iter().flatten()).document()
+        Ok(self.root().containing(children.into_iter().flatten()).document()?)
     }
 
     /// Returns the root element with the attributes of the model.

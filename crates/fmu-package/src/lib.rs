@@ -12,7 +12,6 @@
 //! | purpose | files |
 //! |---|---|
 //! | the sources | `directory`, `content`, `packages`, `sources` |
-//! | files | `xml`, `files` |
 //! | the model | `table`, `call_monitor`, `model`, `instance` |
 //! | checks of the model | `check`, `sample`, `saved_states`, `state_derivatives`, `partial_derivatives` |
 //! | the description | `structure`, `definitions`, `describe` |
@@ -30,7 +29,6 @@ mod cross;
 mod definitions;
 mod describe;
 mod directory;
-pub mod files;
 mod fingerprint;
 mod instance;
 mod library;
@@ -52,7 +50,6 @@ pub mod structure;
 mod table;
 pub mod terminal;
 mod universal;
-pub mod xml;
 
 pub use {
     c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools},

@@ -1,12 +1,12 @@
 //! Makes the FMU, a zip file (section 2.3 of FMI 2.0, 2.5.1 of FMI 3.0). The same content gives the same bytes, on every machine.
 
 use crate::content::ContentFile;
-use crate::files::{write_atomically, zip};
 use crate::fingerprint::Fingerprint;
 use crate::library::{Library, with_stamp};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, ensure};
 use fmi_abi::Standard;
 use fmi_abi::stamp::NO_GUID;
+use fmi_abi::write::{write_atomically, zip};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -53,8 +53,8 @@ pub fn pack(destination: &Path, parts: &Parts) -> Result<Packed> {
         fingerprint.add(&name, &bytes);
     }
     let guid = fingerprint.guid();
-    let zip = zip(&parts.entries(&guid)?)?;
-    let size = write_atomically(destination, |file| Ok(file.write_all(&zip)?))?;
+    let zip = zip(&parts.entries(&guid)?).map_err(Error::msg)?;
+    let size = write_atomically(destination, |file| file.write_all(&zip)).map_err(Error::msg)?;
     Ok(Packed { guid, size })
 }
 

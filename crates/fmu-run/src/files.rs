@@ -4,6 +4,9 @@ use fmi_abi::files::{Limits, Scratch, read_xml, unpack};
 use fmi_abi::shown;
 use std::path::{Path, PathBuf};
 
+/// File of an SSP that contains the structure of the system.
+pub(crate) const STRUCTURE: &str = "SystemStructure.ssd";
+
 /// Directory that contains the files.
 #[derive(Debug)]
 pub(crate) enum Files {
@@ -24,7 +27,7 @@ impl Kind {
     fn file(self) -> &'static str {
         match self {
             Self::Fmu => "modelDescription.xml",
-            Self::Ssp => "SystemStructure.ssd",
+            Self::Ssp => STRUCTURE,
         }
     }
 

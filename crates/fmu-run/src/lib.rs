@@ -42,6 +42,8 @@ pub use instances::{Instances, Mask, Setup, States};
 pub use messages::Logged;
 pub use selection::Selection;
 pub use start::Start;
+#[cfg(feature = "write")]
+pub use system::{CheckedStructure, SystemStructure};
 pub use system::{Composition, Elements, Fmu, Order, StartValue, System, nearest};
 #[doc(hidden)]
 pub use threads::process;

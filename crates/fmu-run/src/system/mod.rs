@@ -3,8 +3,13 @@
 mod configured;
 mod elements;
 mod order;
-mod source;
+#[cfg(feature = "write")]
+mod osp;
+#[cfg(feature = "write")]
+mod packed;
 mod ssp;
+#[cfg(feature = "write")]
+mod structure;
 
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
@@ -23,6 +28,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
+#[cfg(feature = "write")]
+pub use structure::{CheckedStructure, SystemStructure};
 
 /// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run) and as
 /// [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component, which may also run in Model Exchange.

@@ -1,11 +1,12 @@
-//! Reads systems from SSP files (System Structure and Parameterization 1.0).
+//! Reads systems from SSP files.
 
+use super::FMU;
 use super::source::Base;
-use super::{Component, Definition, Order, StartValue, System};
 use crate::error::Error;
-use crate::files::{Files, Kind};
+use crate::files::{Files, Kind, STRUCTURE};
 use crate::fmu::Loaded;
 use crate::start::StartValues;
+use crate::system::{Component, Definition, Order, StartValue, System};
 use fmi_abi::files::{Limits, read_xml};
 use fmi_abi::{shown, xml};
 use roxmltree::Node;
@@ -54,11 +55,10 @@ impl System {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
         let directory = Files::open(path, Kind::Ssp, &mut limits).map_err(fail)?;
-        let text = directory.xml("SystemStructure.ssd").map_err(fail)?;
-        let document = xml::parse(&text, "SystemStructure.ssd").map_err(fail)?;
+        let text = directory.xml(STRUCTURE).map_err(fail)?;
+        let document = xml::parse(&text, STRUCTURE).map_err(fail)?;
         let root = document.root_element();
-        let system =
-            child(root, "System").ok_or_else(|| fail("SystemStructure.ssd has no System".to_owned()))?;
+        let system = child(root, "System").ok_or_else(|| fail(format!("{STRUCTURE} has no System")))?;
         let is_archive = matches!(directory, Files::Temporary(_));
         let mut read = Read::of(Base { directory: directory.path(), is_archive });
         read.system(system, "").map_err(fail)?;
@@ -142,8 +142,8 @@ impl<'a> Read<'a> {
 
     fn component(&mut self, element: Node, name: String) -> Result<(), String> {
         let source = needed(element, "source")?;
-        let kind = element.attribute("type").unwrap_or("application/x-fmu-sharedlibrary");
-        if kind != "application/x-fmu-sharedlibrary" {
+        let kind = element.attribute("type").unwrap_or(FMU);
+        if kind != FMU {
             return Err(format!(
                 "component {} is not an FMU but {}, which cannot be run",
                 shown(&name),

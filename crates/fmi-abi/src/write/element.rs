@@ -1,6 +1,5 @@
 //! XML documents as trees of elements.
 
-use anyhow::Result;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesStart, BytesText, Event};
 use std::fmt::Display;
@@ -64,7 +63,7 @@ impl Element {
     ///
     /// # Errors
     /// Never in practice, as the document is written into memory.
-    pub fn document(&self) -> Result<String> {
+    pub fn document(&self) -> io::Result<String> {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
         writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
         // The root has many attributes, so each is on a separate line.
@@ -73,7 +72,7 @@ impl Element {
             root = root.new_line().with_attribute((name.as_str(), value.as_str()));
         }
         root.write_inner_content(|writer| self.children.iter().try_for_each(|child| child.write(writer)))?;
-        let mut text = String::from_utf8(writer.into_inner())?;
+        let mut text = String::from_utf8(writer.into_inner()).map_err(io::Error::other)?;
         text.push('\n');
         Ok(text)
     }

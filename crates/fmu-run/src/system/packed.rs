@@ -1,23 +1,25 @@
-//! Reads the data of an FMU that a system needs.
+//! The FMUs of a system that is written.
 
-use anyhow::{Result, anyhow, bail, ensure};
-use fmu_package::files::unzip;
-use fmu_run::{Attributes, Description, Variable};
+use crate::description::{Attributes, Description, Variable};
+use fmi_abi::write::unzip;
+use std::path::Path;
 
-/// An FMU that has been read.
-pub struct Fmu {
+/// An FMU that is packed into a system.
+pub(super) struct PackedFmu {
     pub bytes: Vec<u8>,
     pub description: Description,
 }
 
 /// Names and numbers of the items of an enumeration.
-pub type Items = [(String, String)];
+pub(super) type Items = [(String, String)];
 
-impl Fmu {
-    /// Reads an FMU from the content of its file.
-    pub fn read(bytes: Vec<u8>) -> Result<Self> {
-        let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?)?;
-        Ok(Self { bytes, description: Description::parse(&text).map_err(|why| anyhow!(why))? })
+impl PackedFmu {
+    /// Reads an FMU.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let bytes = std::fs::read(path).map_err(|error| format!("it cannot be read: {error}"))?;
+        let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?);
+        let description = Description::parse(&text.map_err(|error| error.to_string())?)?;
+        Ok(Self { bytes, description })
     }
 
     /// Returns a variable of the FMU.
@@ -28,8 +30,8 @@ impl Fmu {
 
 /// A variable of an FMU.
 #[derive(Clone, Copy)]
-pub struct FmuVariable<'a> {
-    fmu: &'a Fmu,
+pub(super) struct FmuVariable<'a> {
+    fmu: &'a PackedFmu,
     pub variable: &'a Variable,
 }
 
@@ -58,17 +60,19 @@ impl<'a> FmuVariable<'a> {
     }
 
     /// Fails if a system cannot set the start value of this variable.
-    pub fn check_settable(self, name: &str) -> Result<()> {
+    pub fn check_settable(self, name: &str) -> Result<(), String> {
         let Variable { start, .. } = self.variable;
         let Attributes { variability, causality, .. } = &**self.variable;
         let is_constant = variability.as_deref() == Some("constant");
-        ensure!(start.is_some() && !is_constant, "{name} is {causality} and takes no start value");
-        Ok(())
+        match start.is_some() && !is_constant {
+            true => Ok(()),
+            false => Err(format!("{name} is {causality} and takes no start value")),
+        }
     }
 
     /// Fails if the string is not a valid value: a number in the range, `true` or `false`, a string, or an item
     /// of the enumeration.
-    pub fn check_start(self, name: &str, text: &str) -> Result<()> {
+    pub fn check_start(self, name: &str, text: &str) -> Result<(), String> {
         let number: Option<f64> = match self.kind() {
             "Real" => text.parse().ok(),
             "Integer" => text.parse::<i64>().ok().map(|value| value as f64),
@@ -76,16 +80,19 @@ impl<'a> FmuVariable<'a> {
         };
         if let Some(value) = number {
             let Attributes { min, max, base, .. } = &**self.variable;
-            ensure!(value.is_finite(), "the start value of {name} must be a finite number, it is {value}");
+            let must = |rule: String| Err(format!("the start value of {name} must {rule}, it is {value}"));
+            if !value.is_finite() {
+                return must("be a finite number".to_owned());
+            }
             let [lowest, highest] = match base.range() {
                 Some((lowest, highest)) => [Some(lowest as f64), Some(highest as f64)],
                 None => [None, None],
             };
             if let Some(min) = min.or(lowest).filter(|min| value < *min) {
-                bail!("the start value of {name} must not be below {min}, it is {value}");
+                return must(format!("not be below {min}"));
             }
             if let Some(max) = max.or(highest).filter(|max| value > *max) {
-                bail!("the start value of {name} must not be above {max}, it is {value}");
+                return must(format!("not be above {max}"));
             }
         }
         let possible = match self.kind() {
@@ -95,7 +102,11 @@ impl<'a> FmuVariable<'a> {
             "Binary" => false,
             _ => true,
         };
-        ensure!(possible, "{name} is {}, its start value cannot be '{}'", self.kind(), text.escape_debug());
-        Ok(())
+        match possible {
+            true => Ok(()),
+            false => {
+                Err(format!("{name} is {}, its start value cannot be '{}'", self.kind(), text.escape_debug()))
+            }
+        }
     }
 }

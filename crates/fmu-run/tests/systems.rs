@@ -1,6 +1,6 @@
 //! Systems of FMUs: messages about wrong connections, and the files of correct systems.
 
-use fmu_system::System;
+use fmu_run::SystemStructure;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -76,8 +76,8 @@ fn fmus(directory: &Path) -> Vec<(&'static str, PathBuf)> {
     ]
 }
 
-fn system<'a>(directory: &Path) -> System<'a> {
-    System {
+fn system<'a>(directory: &Path) -> SystemStructure<'a> {
+    SystemStructure {
         name: "loop",
         description: "A loop",
         components: fmus(directory),
@@ -93,13 +93,16 @@ fn system<'a>(directory: &Path) -> System<'a> {
 #[test]
 fn wrong_systems_are_rejected() {
     let directory = tempfile::tempdir().unwrap();
-    let rejection = |change: fn(&mut System)| {
+    let rejection = |change: fn(&mut SystemStructure)| {
         let mut system = system(directory.path());
         change(&mut system);
         format!("{:#}", system.check().err().expect("a wrong system must be rejected"))
     };
     for (change, message) in [
-        ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),
+        (
+            (|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut SystemStructure),
+            "no FMU has a variable law.x",
+        ),
         (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
         (
             |s| s.connections.push(("plant.delay", "law.r")),
@@ -268,8 +271,8 @@ fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
 }
 
 /// Returns a system of two plants in series.
-fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> System<'a> {
-    System {
+fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> SystemStructure<'a> {
+    SystemStructure {
         name: "twins",
         description: "Two of a kind",
         components,

@@ -1,32 +1,28 @@
-//! Output for libcosim: a directory with `OspSystemStructure.xml` and the FMUs.
+//! Writes systems for libcosim: a directory with `OspSystemStructure.xml` and the FMUs.
 
-use crate::system::{CheckedSystem, file_name, split};
-use anyhow::Result;
-use fmu_package::files::write_atomically;
-use fmu_package::xml::Element;
+use super::structure::{CheckedStructure, document, file_name, split};
+use crate::error::Error;
+use fmi_abi::write::{Element, write_atomically};
 use std::io::Write;
 use std::path::Path;
 
-impl CheckedSystem<'_> {
+impl CheckedStructure<'_> {
     /// Writes the directory for libcosim: `OspSystemStructure.xml` and the FMUs.
     ///
     /// # Errors
-    /// Fails if a file cannot be written.
-    pub fn write_osp(&self, directory: &Path) -> Result<()> {
-        for (name, bytes) in self.files()? {
-            write_atomically(&directory.join(name), |file| Ok(file.write_all(bytes)?))?;
+    /// Returns [`Error::Fmu`] if a file cannot be written.
+    pub fn write_osp(&self, directory: &Path) -> Result<(), Error> {
+        let text = document(&self.osp()?)?;
+        for (name, bytes) in self.files()?.into_iter().chain([("OspSystemStructure.xml", text.as_slice())]) {
+            write_atomically(&directory.join(name), |file| file.write_all(bytes)).map_err(Error::Fmu)?;
         }
-        let text = self.osp()?.document()?;
-        write_atomically(&directory.join("OspSystemStructure.xml"), |file| {
-            Ok(file.write_all(text.as_bytes())?)
-        })?;
         Ok(())
     }
 
-    fn osp(&self) -> Result<Element> {
+    fn osp(&self) -> Result<Element, Error> {
         let mut simulators = Vec::new();
-        for (component, path) in &self.system.components {
-            let inputs = self.system.inputs.iter().map(|(_, to, start)| (*to, start.as_str()));
+        for (component, path) in &self.structure.components {
+            let inputs = self.structure.inputs.iter().map(|(_, to, start)| (*to, start.as_str()));
             let inputs = inputs.filter(|(to, _)| split(to).0 == *component);
             let mut initial = Vec::new();
             for (name, start) in self.own_start(component).into_iter().chain(inputs) {
@@ -43,7 +39,7 @@ impl CheckedSystem<'_> {
             let (simulator, name) = split(end);
             Element::new("Variable").with("simulator", simulator).with("name", name)
         };
-        let connections = self.system.connections.iter();
+        let connections = self.structure.connections.iter();
         let connections = connections
             .map(|(from, to)| Element::new("VariableConnection").containing([variable(from), variable(to)]));
         let root = Element::new("OspSystemStructure")
@@ -51,8 +47,8 @@ impl CheckedSystem<'_> {
             .with("version", "0.1");
         Ok(root.containing([
             Element::new("StartTime").saying("0.0"),
-            Element::new("EndTime").saying(self.system.stop_time),
-            Element::new("BaseStepSize").saying(self.system.step_size),
+            Element::new("EndTime").saying(self.structure.stop_time),
+            Element::new("BaseStepSize").saying(self.structure.step_size),
             Element::new("Algorithm").saying("fixedStep"),
             Element::new("Simulators").containing(simulators),
             Element::new("Connections").containing(connections),
@@ -60,7 +56,7 @@ impl CheckedSystem<'_> {
     }
 
     /// Returns the element of an initial value. An item of an enumeration is written as its number.
-    fn initial_value(&self, name: &str, start: &str) -> Result<Element> {
+    fn initial_value(&self, name: &str, start: &str) -> Result<Element, Error> {
         let variable = self.variable(name)?;
         Ok(match variable.number_of(start) {
             Some(number) => Element::new("Integer").with("value", number),

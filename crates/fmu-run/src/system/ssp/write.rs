@@ -1,17 +1,18 @@
-//! Output as SSP: System Structure and Parameterization 1.0.
+//! Writes systems as SSP files.
 
-use crate::fmu::{FmuVariable, Items};
-use crate::system::{CheckedSystem, System, file_name, split};
-use anyhow::{Result, ensure};
-use fmu_package::files::{write_atomically, zip};
-use fmu_package::xml::Element;
+use super::FMU;
+use crate::error::{Error, request};
+use crate::files::STRUCTURE;
+use crate::system::packed::{FmuVariable, Items};
+use crate::system::structure::{CheckedStructure, SystemStructure, document, file_name, split};
+use fmi_abi::write::{Element, write_atomically, zip};
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
 use std::path::Path;
 
 const COMMON: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
 
-impl CheckedSystem<'_> {
+impl CheckedStructure<'_> {
     /// Writes the SSP file and returns its size in bytes.
     ///
     /// The directory `resources` contains the FMUs, and a file with start values for each component that has
@@ -19,25 +20,27 @@ impl CheckedSystem<'_> {
     /// these files, the parameter set is named `default`.
     ///
     /// # Errors
-    /// Fails if the file cannot be written, or if two FMUs have different enumerations with the same name.
-    pub fn write_ssp(&self, destination: &Path) -> Result<u64> {
-        let mut entries = vec![("SystemStructure.ssd".to_owned(), self.ssd()?.document()?.into_bytes())];
+    /// Returns [`Error::Fmu`] if the file cannot be written, and [`Error::Request`] if two FMUs have different enumerations with the
+    /// same name.
+    pub fn write_ssp(&self, destination: &Path) -> Result<u64, Error> {
+        let mut entries = vec![(STRUCTURE.to_owned(), document(&self.ssd()?)?)];
         for (name, bytes) in self.files()? {
             entries.push((format!("resources/{name}"), bytes.to_vec()));
         }
-        for (component, _) in &self.system.components {
+        for (component, _) in &self.structure.components {
             let own = self.own_start(component).into_iter().map(|(name, start)| (split(name).1, name, start));
             entries.extend(self.ssv(component, own)?);
         }
-        let inputs = self.system.inputs.iter().map(|(name, to, start)| (*name, *to, start.as_str()));
+        let inputs = self.structure.inputs.iter().map(|(name, to, start)| (*name, *to, start.as_str()));
         entries.extend(self.ssv("experiment", inputs)?);
         entries[1..].sort();
-        let bytes = zip(&entries)?;
-        write_atomically(destination, |file| Ok(file.write_all(&bytes)?))
+        let bytes = zip(&entries).map_err(Error::Fmu)?;
+        write_atomically(destination, |file| file.write_all(&bytes)).map_err(Error::Fmu)
     }
 
-    fn ssd(&self) -> Result<Element> {
-        let System { name, description, components, inputs, outputs, connections, .. } = self.system;
+    fn ssd(&self) -> Result<Element, Error> {
+        let SystemStructure { name, description, components, inputs, outputs, connections, .. } =
+            self.structure;
         let mut elements = Vec::new();
         for (component, path) in components {
             let own = |end: &str| split(end).0 == *component;
@@ -55,7 +58,7 @@ impl CheckedSystem<'_> {
             let start = !self.own_start(component).is_empty();
             let element = Element::new("ssd:Component")
                 .with("name", component)
-                .with("type", "application/x-fmu-sharedlibrary")
+                .with("type", FMU)
                 .with("source", format!("resources/{}", file_name(path)?))
                 .containing(list("ssd:Connectors", connectors))
                 .containing(start.then(|| binding(component)));
@@ -67,7 +70,7 @@ impl CheckedSystem<'_> {
 
         let own_inputs = inputs.iter().map(|(name, to, _)| self.connector(name, to, "input"));
         let own_outputs = outputs.iter().map(|(name, from)| self.connector(name, from, "output"));
-        let connectors: Vec<Element> = own_inputs.chain(own_outputs).collect::<Result<_>>()?;
+        let connectors: Vec<Element> = own_inputs.chain(own_outputs).collect::<Result<_, Error>>()?;
         let system = Element::new("ssd:System")
             .with("name", name)
             .with("description", description)
@@ -81,10 +84,10 @@ impl CheckedSystem<'_> {
             .with("xmlns:ssc", COMMON)
             .with("version", "1.0")
             .with("name", name)
-            .with("generationTool", concat!("fmu-system ", env!("CARGO_PKG_VERSION")));
+            .with("generationTool", concat!("fmu-run ", env!("CARGO_PKG_VERSION")));
         let experiment = Element::new("ssd:DefaultExperiment")
             .with("startTime", 0)
-            .with("stopTime", self.system.stop_time);
+            .with("stopTime", self.structure.stop_time);
         let used = self.connected()?;
         Ok(root
             .containing([system])
@@ -98,7 +101,7 @@ impl CheckedSystem<'_> {
     fn omsimulator(&self) -> Element {
         let master = Element::new("oms:FixedStepMaster")
             .with("description", "oms-ma")
-            .with("stepSize", self.system.step_size)
+            .with("stepSize", self.structure.step_size)
             .with("absoluteTolerance", 1e-4)
             .with("relativeTolerance", 1e-4);
         let annotations = Element::new("oms:Annotations")
@@ -113,8 +116,8 @@ impl CheckedSystem<'_> {
     }
 
     /// Returns the variables at both ends of all connections. Their units and enumerations are defined in the file.
-    fn connected(&self) -> Result<Vec<FmuVariable<'_>>> {
-        let System { inputs, outputs, connections, .. } = self.system;
+    fn connected(&self) -> Result<Vec<FmuVariable<'_>>, Error> {
+        let SystemStructure { inputs, outputs, connections, .. } = self.structure;
         let ends = connections.iter().flat_map(|(from, to)| [*from, *to]);
         let ends =
             ends.chain(inputs.iter().map(|(_, to, _)| *to)).chain(outputs.iter().map(|(_, from)| *from));
@@ -135,7 +138,7 @@ impl CheckedSystem<'_> {
     }
 
     /// Returns a connector with the type and unit of a variable.
-    fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element> {
+    fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element, Error> {
         let of = self.variable(of)?;
         let base_type = Element::new(format!("ssc:{}", of.kind()))
             .with_some("unit", of.variable.unit.as_ref())
@@ -149,7 +152,7 @@ impl CheckedSystem<'_> {
         &self,
         component: &str,
         start: impl IntoIterator<Item = (&'b str, &'b str, &'b str)>,
-    ) -> Result<Option<(String, Vec<u8>)>> {
+    ) -> Result<Option<(String, Vec<u8>)>, Error> {
         let mut units = BTreeMap::new();
         let mut parameters = Vec::new();
         for (name, variable, start) in start {
@@ -172,16 +175,18 @@ impl CheckedSystem<'_> {
             .containing(
                 (!units.is_empty()).then(|| Element::new("ssv:Units").containing(units.into_values())),
             );
-        Ok(Some((format!("resources/{component}.ssv"), root.document()?.into_bytes())))
+        Ok(Some((format!("resources/{component}.ssv"), document(&root)?)))
     }
 }
 
 /// Returns the enumerations of variables, if there are any.
-fn enumerations(variables: &[FmuVariable]) -> Result<Option<Element>> {
+fn enumerations(variables: &[FmuVariable]) -> Result<Option<Element>, Error> {
     let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
     for (name, items) in variables.iter().filter_map(|of| of.items()) {
         let before = known.entry(name).or_insert(items);
-        ensure!(*before == items, "two FMUs have different enumerations with the name {name}");
+        if *before != items {
+            return request(format!("two FMUs have different enumerations with the name {name}"));
+        }
     }
     let element = |(name, items): (&str, &Items)| {
         let item = |(name, value): &(String, String)| {

@@ -1,9 +1,12 @@
-//! Zip files, and files that are written atomically.
+//! Writes archives and XML documents that are the same bytes on every machine, and files atomically.
 
-use anyhow::{Context, Result, ensure};
+mod element;
+
+pub use element::Element;
 use std::fs::{self, File};
-use std::io::{Cursor, Read, Write};
+use std::io::{self, Cursor, Read, Write};
 use std::path::Path;
+use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
@@ -11,9 +14,9 @@ use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 ///
 /// # Errors
 /// When two consecutive entries have the same name.
-pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
-    for pair in entries.windows(2) {
-        ensure!(pair[0].0 != pair[1].0, "{} occurs twice in the zip file", pair[0].0);
+pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>, String> {
+    if let Some(pair) = entries.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        return Err(format!("{} occurs twice in the zip file", pair[0].0));
     }
     // These settings would otherwise depend on the clock or the machine.
     let options = SimpleFileOptions::default()
@@ -22,27 +25,28 @@ pub fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
         .last_modified_time(DateTime::default())
         .unix_permissions(0o644)
         .system(System::Unix);
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let mut write = || {
+    let write = || -> ZipResult<Vec<u8>> {
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
         for (name, bytes) in entries {
             zip.start_file(name, options)?;
             zip.write_all(bytes)?;
         }
-        anyhow::Ok(())
+        Ok(zip.finish()?.into_inner())
     };
-    write().context("cannot make the zip file")?;
-    Ok(zip.finish().context("cannot make the zip file")?.into_inner())
+    write().map_err(|error| format!("cannot make the zip file: {error}"))
 }
 
 /// Returns the content of an entry of a zip file.
 ///
 /// # Errors
 /// When it is not a zip file, or when the entry is missing.
-pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>> {
-    let mut archive = ZipArchive::new(Cursor::new(zip))?;
-    let mut content = Vec::new();
-    archive.by_name(name)?.read_to_end(&mut content)?;
-    Ok(content)
+pub fn unzip(zip: &[u8], name: &str) -> Result<Vec<u8>, String> {
+    let read = || -> ZipResult<Vec<u8>> {
+        let mut content = Vec::new();
+        ZipArchive::new(Cursor::new(zip))?.by_name(name)?.read_to_end(&mut content)?;
+        Ok(content)
+    };
+    read().map_err(|error| error.to_string())
 }
 
 /// Beginning of the names of temporary files.
@@ -67,13 +71,19 @@ fn remove_abandoned(directory: &Path) {
 ///
 /// # Errors
 /// When the directory or the file cannot be written, or `write` fails; the destination then does not change.
-pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Result<()>) -> Result<u64> {
+pub fn write_atomically(
+    destination: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> Result<u64, String> {
     let directory = match destination.parent() {
         Some(directory) if directory != Path::new("") => directory,
         _ => Path::new("."),
     };
-    fs::create_dir_all(directory)
-        .with_context(|| format!("cannot make the directory {}", directory.display()))?;
+    let during = |what: &'static str, path: &Path| {
+        let begin = format!("cannot {what} {}: ", path.display());
+        move |error: io::Error| begin.clone() + &error.to_string()
+    };
+    fs::create_dir_all(directory).map_err(during("make the directory", directory))?;
     remove_abandoned(directory);
     let mut builder = tempfile::Builder::new();
     // Temporary files are private by default; the result has the permissions of the user's umask.
@@ -84,19 +94,21 @@ pub fn write_atomically(destination: &Path, write: impl FnOnce(&mut File) -> Res
         let file = builder.tempfile_in(directory)?;
         #[cfg(unix)]
         file.as_file().lock()?;
-        std::io::Result::Ok(file)
+        io::Result::Ok(file)
     };
-    let failed = || format!("cannot write in the directory {}", directory.display());
-    let mut file = create().with_context(failed)?;
+    let failed = during("write in the directory", directory);
+    let mut file = create().map_err(&failed)?;
     // Before this process locked the file, another one may have removed it as abandoned.
     while !file.path().exists() {
-        file = create().with_context(failed)?;
+        file = create().map_err(&failed)?;
     }
-    let failed = || format!("cannot write {}", destination.display());
-    write(file.as_file_mut()).with_context(failed)?;
-    // Otherwise the file may be empty after a power failure.
-    file.as_file().sync_all().with_context(failed)?;
-    let size = file.as_file().metadata().with_context(failed)?.len();
-    file.persist(destination).with_context(failed)?;
-    Ok(size)
+    let finish = || {
+        write(file.as_file_mut())?;
+        // Otherwise the file may be empty after a power failure.
+        file.as_file().sync_all()?;
+        let size = file.as_file().metadata()?.len();
+        file.persist(destination)?;
+        Ok(size)
+    };
+    finish().map_err(during("write", destination))
 }
