@@ -143,7 +143,7 @@ test: need-rust need-python
 
 # What takes too long for make test: each template of cargo fmu to its checked FMU, and the tools that maintain this repository.
 test-long: need-rust headers importer-fmus source-fmu
-	$(NO_JOBS) $(CARGO) test $(LOCKED) -p cargo-fmu --test cargo_fmu -- --ignored
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu -- --ignored
 	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop
 
 # C programs are compiled with the headers of the standard, which FMPy contains.
@@ -231,7 +231,7 @@ validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 closed-loop-fmus: fmu
 	@$(BUILD_CONTROLLER)
 	@$(BUILD_CLOSED_LOOP)
-	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p cargo-fmu)
+	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p fmu-package --bin cargo-fmu)
 	@rm -rf target/lag && $(NO_JOBS) target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
 	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models $(NO_JOBS) ../debug/cargo-fmu fmu build --out ../fmu
 	@cd crates/prw-motor && $(NO_JOBS) ../../target/debug/cargo-fmu fmu build --no-page --out ../../target/fmu

@@ -54,7 +54,6 @@ def test_links_are_found() -> None:
 def test_the_published_crates() -> None:
     names = {directory.name for directory in published()}
     assert names == {
-        "cargo-fmu",
         "fmi-abi",
         "fmi-client",
         "fmu-check",

@@ -96,9 +96,9 @@ def test_models_are_created_outside_of_the_clone() -> None:
     found = 0
     for name in PAGES:
         for block in re.findall(r"^```.*?^```", text(name), re.DOTALL | re.MULTILINE):
-            if "cargo install --path crates/cargo-fmu" in block and "cargo fmu new" in block:
+            if "cargo install --path crates/fmu-package" in block and "cargo fmu new" in block:
                 found += 1
-                assert re.search(r"crates/cargo-fmu.*^(?:\$ )?cd \.\..*cargo fmu new", block, re.DOTALL | re.M), name
+                assert re.search(r"crates/fmu-package.*^(?:\$ )?cd \.\..*cargo fmu new", block, re.DOTALL | re.M), name
     assert found >= 2
 
 

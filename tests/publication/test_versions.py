@@ -49,7 +49,7 @@ def test_the_pages_name_the_oldest_rust() -> None:
         if versions and page != "CHANGELOG.md":
             assert set(versions) == {oldest}, page
             naming.add(page)
-    assert naming >= {f"crates/{name}/README.md" for name in ("cargo-fmu", "fmu-check", "fmu-export", "fmu-run")}
+    assert naming >= {f"crates/{name}/README.md" for name in ("fmu-check", "fmu-export", "fmu-package", "fmu-run")}
 
 
 def test_releases_are_compiled_with_an_exact_supported_rust() -> None:

@@ -229,7 +229,7 @@ def shown_workflows() -> dict[str, list[str]]:
 
 
 def test_pages_with_workflows_are_found() -> None:
-    assert shown_workflows().keys() == {"crates/cargo-fmu/README.md", "crates/fmu-check/README.md"}
+    assert shown_workflows().keys() == {"crates/fmu-check/README.md", "crates/fmu-package/README.md"}
     # An action outside of these blocks would not be checked.
     for name in PAGES:
         page = (ROOT / name).read_text(encoding="utf-8")

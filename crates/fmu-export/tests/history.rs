@@ -3,9 +3,9 @@
 
 mod models;
 
-#[path = "../../cargo-fmu/models/house/src/house.rs"]
+#[path = "../../fmu-package/models/house/src/house.rs"]
 mod house;
-#[path = "../../cargo-fmu/models/lag/src/lib.rs"]
+#[path = "../../fmu-package/models/lag/src/lib.rs"]
 mod lag;
 
 use fmu_test_kit::history::Histories;
@@ -48,7 +48,7 @@ fn meter() {
 #[test]
 fn house() {
     const RESOURCES: &str =
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../cargo-fmu/models/house/modelDescription/resources");
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../fmu-package/models/house/modelDescription/resources");
     let location = CString::new(RESOURCES).unwrap();
     Histories { resource_location: Some(&location), ..Histories::default() }.check::<house::House>();
 }

@@ -2,7 +2,7 @@
 //! use features that only FMI 3.0 has.
 #![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every test model")]
 
-#[path = "../../../cargo-fmu/models/ball/src/ball.rs"]
+#[path = "../../../fmu-package/models/ball/src/ball.rs"]
 pub mod ball;
 pub mod clumsy;
 pub mod counter;
@@ -11,7 +11,7 @@ pub mod fuse;
 pub mod grumbler;
 pub mod lazy;
 pub mod meter;
-#[path = "../../../cargo-fmu/models/motor/src/motor.rs"]
+#[path = "../../../fmu-package/models/motor/src/motor.rs"]
 pub mod motor;
 pub mod oscillator;
 pub mod palette;

@@ -1,6 +1,4 @@
-#![doc = include_str!("../README.md")]
-//!
-//! ## Structure of the crate
+//! The program behind `cargo fmu`, which the README of the crate describes.
 //!
 //! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, whose interface types
 //! `compare` compares. `run` simulates an FMU with the inputs that `inputs` reads, `results` writes the table of results, and `plot`

@@ -39,7 +39,7 @@ enum Begin {
 /// The files of a model, except `Cargo.toml` and `Cargo.lock`, which are written for each crate.
 macro_rules! files {
     ($model:literal: $($file:literal)+) => {
-        ($model, &[$(($file, include_str!(concat!("../models/", $model, "/", $file)))),+])
+        ($model, &[$(($file, include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/models/", $model, "/", $file)))),+])
     };
 }
 
