@@ -90,7 +90,7 @@ help:
 	@echo 'make bench                   compare the speed of the FMU with C    -> dev/benches/ratios.json'
 	@echo 'make instructions            count the instructions of about 25 uses, with callgrind, into the table that make test compares'
 	@echo 'make figures                 draw the figures of the paper          -> out/*.svg, out/*.png'
-	@echo 'make docs                    update the documentation in the FMUs and docs/examples.md'
+	@echo 'make docs                    update the model descriptions, docs/performance.md and docs/examples.md'
 	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
 	@echo 'make examples                install and build what the examples need (see docs/examples.md)'
 	@echo 'make experiments             update the reference experiments in the FMU'

@@ -56,16 +56,12 @@ fn run(matches: &ArgMatches) -> Result<()> {
     builder.run(&BuildOptions::from_arg_matches(matches)?)
 }
 
-/// Returns the scripts that draw the wrist on the page of the FMU, and the controller FMU that closes the loop there.
+/// Returns the page of the FMU, the scripts that draw the wrist there, and the controller FMU that closes the loop.
 fn page() -> Page {
+    let own = [include_str!("docs/fmu-page/wrist/testbed.js"), include_str!("docs/fmu-page/wrist/steps.js")];
     Page {
-        scripts: vec![
-            include_str!("docs/fmu-page/wrist/wrist.js"),
-            concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
-            include_str!("docs/fmu-page/wrist/view.js"),
-            include_str!("docs/fmu-page/wrist/testbed.js"),
-            include_str!("docs/fmu-page/wrist/steps.js"),
-        ],
+        html: Some(prw_page::testbed),
+        scripts: [&prw_page::WRIST[..], &own].concat(),
         companions: vec!["prw_controller"],
     }
 }

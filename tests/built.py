@@ -6,6 +6,7 @@ import base64
 import importlib.util
 import os
 import re
+import zipfile
 import zlib
 from pathlib import Path
 
@@ -16,6 +17,13 @@ ROOT = Path(__file__).resolve().parents[1]
 FMUS = Path(os.environ.get("FMUS", ROOT / "target" / "fmu"))
 #: The call with which a page decompresses and runs its script.
 SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(showFailure\);\n')
+
+#: The parts of a page that run the FMU: the content security policy, the element in which the FMU is drawn (with a note for browsers
+#: without scripts), the styles and the scripts.
+LIVE = re.compile(
+    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?',
+    re.S,
+)
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:
@@ -31,6 +39,12 @@ def program(name: str, package: str = "build_fmu") -> list[str]:
     if directory := os.environ.get("PROGRAMS"):
         return [str(ROOT / directory / name)]
     return ["cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", name, "--"]
+
+
+def text_of(fmu: Path) -> str:
+    """Returns the page in an FMU without the parts that run the FMU."""
+    with zipfile.ZipFile(fmu) as archive:
+        return LIVE.sub("", archive.read("documentation/index.html").decode())
 
 
 def needed(module: str, package: str) -> None:

@@ -28,12 +28,9 @@ fn builder(directory: PathBuf) -> Builder {
         },
         terminals: terminals(),
         page: Page {
-            scripts: vec![
-                include_str!("../../docs/fmu-page/wrist/wrist.js"),
-                concat!("WRIST = ", include_str!("../../docs/fmu-page/wrist/wrist.json"), ";\n"),
-                include_str!("../../docs/fmu-page/wrist/view.js"),
-                include_str!("../../docs/fmu-page/wrist/controller.js"),
-            ],
+            html: Some(prw_page::controller),
+            scripts: [&prw_page::WRIST[..], &[include_str!("../../docs/fmu-page/wrist/controller.js")]]
+                .concat(),
             companions: vec!["prw_testbed"],
         },
         ..Builder::new("prw_controller", directory)

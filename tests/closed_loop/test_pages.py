@@ -13,17 +13,16 @@ from unittest.mock import Mock, call, patch
 
 import fmpy.ssp
 import pytest
-from built import ROOT, program
+from built import ROOT, built, program, text_of
 from lxml import etree
 
-from tools.documentation.pages import CONTROLLER, TESTBED
-from tools.documentation.sources import read_description
+from tools.documentation.sources import CONTROLLER, TESTBED, read_description
 
 
 @pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])
 def test_the_programs(closed_loop, tmp_path, master, package):
     pytest.importorskip(package)
-    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    page = text_of(built("prw_testbed.fmu"))
     (program,) = re.findall(
         rf'<pre data-run="closed_loop_in_{master}" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S
     )
@@ -39,7 +38,7 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 
 def test_the_script_for_omsimulator(closed_loop):
     """A mock of OMSimulator records the calls of the script, which must build the same system as the SSP."""
-    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    page = text_of(built("prw_testbed.fmu"))
     (script,) = re.findall(r'<pre data-script="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))
     with patch.dict(sys.modules, {"OMSimulator": library}):
@@ -71,8 +70,8 @@ def test_the_model_for_openmodelica_has_the_connections_of_the_ssp(closed_loop):
     assert sorted(connections) == sorted(tuple(connection) for connection in closed_loop.connections)
     for name, (end, value) in closed_loop.inputs.items():
         assert f"  parameter Real {name} = {value} " in model and f"  {end} = {name};" in model
-    for component, page in (("testbed", TESTBED), ("controller", CONTROLLER)):
-        known = {variable.name for variable in read_description(ROOT / page.description).modelVariables}
+    for component, path in (("testbed", TESTBED), ("controller", CONTROLLER)):
+        known = {variable.name for variable in read_description(ROOT / path).modelVariables}
         assert set(re.findall(rf"\b{component}\.(\w+)", model)) <= known
 
 

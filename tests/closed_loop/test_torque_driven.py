@@ -11,13 +11,12 @@ from typing import Any
 import machine
 import numpy as np
 import pytest
-from built import ROOT, built
+from built import ROOT, built, text_of
 from fmu_run import Fmu
 from lagrange import table_1
 from scipy.integrate import solve_ivp
 
-from tools.documentation.pages import TESTBED
-from tools.documentation.sources import read_description, read_table
+from tools.documentation.sources import TESTBED, read_description, read_table
 
 MODELS = ROOT / "examples/openmodelica"
 MODEL = (MODELS / "TorqueDriven.mo").read_text(encoding="utf-8")
@@ -148,7 +147,7 @@ def test_a_compiler_of_modelica_accepts_the_text(name):
 
 
 def test_the_models_use_the_names_of_the_fmu():
-    known = {variable.name for variable in read_description(ROOT / TESTBED.description).modelVariables}
+    known = {variable.name for variable in read_description(ROOT / TESTBED).modelVariables}
     used = set(re.findall(r"\btestbed\.(\w+)", MODEL))
     assert used == {"theta1", "theta2", "omega1", "omega2", "tau1", "tau2"} <= known
     script = (MODELS / "torque_driven.mos").read_text(encoding="utf-8")
@@ -159,7 +158,7 @@ def test_the_models_use_the_names_of_the_fmu():
 
 
 def test_the_page_in_the_fmu_shows_lines_of_the_model():
-    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    page = text_of(built("prw_testbed.fmu"))
     (shown,) = re.findall(r'<pre data-model="TorqueDriven" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     lines = [line for line in html.unescape(shown).splitlines() if line]
     assert len(lines) > 3 and set(lines) <= set(MODEL.splitlines())

@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from built import ROOT, built
+from built import ROOT, built, text_of
 from fmpy import simulate_fmu
 from lagrange import OUTPUTS
 from lxml import etree
@@ -21,7 +21,6 @@ from reference import integrate
 
 from prw.errors import UserError
 from prw.motion import Motion
-from tools.documentation.pages import PAGES, TESTBED, render
 from tools.documentation.sources import read_table
 from tools.figures import COMMITTED, bode, plots
 from tools.figures.plots import figures
@@ -35,18 +34,10 @@ EPSILON = np.finfo(float).eps
 NUMBER = re.compile(r"-?(?:\d+(?:\.\d+)?|\.\d+)")
 
 
-def text_of(page) -> str:
-    return (ROOT / page.path).read_text(encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
-def page() -> str:
+def page(fmu) -> str:
     """The testbed's page."""
-    return text_of(TESTBED)
-
-
-#: Runs a test for each page.
-both = pytest.mark.parametrize("page", [pytest.param(text_of(page), id=page.text) for page in PAGES])
+    return text_of(fmu)
 
 
 @pytest.fixture(scope="module")
@@ -54,25 +45,18 @@ def found(fmu):
     return results(fmu)
 
 
-@pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
-def test_the_pages_are_up_to_date(which):
-    assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; `make docs` updates it"
-
-
-@pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
-def test_the_fmu_contains_page_and_icons(which):
-    path, page = built(f"prw_{which.text}.fmu"), text_of(which)
+@pytest.mark.parametrize("name, sources", [("testbed", "."), ("controller", "crates/prw-controller")])
+def test_the_fmu_contains_the_icons(name, sources):
+    path = built(f"prw_{name}.fmu")
     with zipfile.ZipFile(path) as archive:
-        # build_fmu adds the parts that run the FMU, before and after this text; test_page.py tests them.
-        main = page[page.index("<main>") + len("<main>") : page.index("</body>")]
-        assert main in archive.read("documentation/index.html").decode()
         for icon in ("model.png", "documentation/model.svg"):
-            assert archive.read(icon) == (ROOT / which.content / icon).read_bytes()
+            assert archive.read(icon) == (ROOT / sources / "modelDescription" / icon).read_bytes()
     assert path.stat().st_size < 2e6
 
 
-@both
-def test_the_page_is_well_formed_and_loads_nothing(page):
+@pytest.mark.parametrize("name", ["testbed", "controller"])
+def test_the_page_is_well_formed_and_loads_nothing(name):
+    page = text_of(built(f"prw_{name}.fmu"))
     etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
     ids = re.findall(r'\sid="([^"]+)"', page)
     assert len(ids) == len(set(ids)) and {*re.findall(r'(?:href="|url\()#([^")]+)', page)} <= {*ids}

@@ -13,22 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from built import ROOT, built, script_of
+from built import ROOT, built, script_of, text_of
 from fmpy import read_model_description
 from fmu_run import Fmu
 from test_references import NAMES
 from wasmtime import Engine, FuncType, Linker, Module, Store, ValType
 
 from prw.checking.experiments import read_experiments
-from tools.documentation.pages import CONTROLLER, TESTBED
 
 PAGE = "documentation/index.html"
-#: The parts of the page that build_fmu adds: the content security policy, the element in which the FMU is drawn (with a note for
-#: browsers without scripts), the styles and the scripts.
-LIVE = re.compile(
-    r'<meta http-equiv="Content-Security-Policy"[^>]*>\n|<div id="live".*?</noscript></div>|<style>\n\.live,.*</script>\n?',
-    re.S,
-)
 GUID = re.compile(rb' guid="(\{[-0-9a-f]+\})"')
 PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
@@ -90,11 +83,10 @@ class WebAssembly:
         return bytes(self.functions["memory"].read(self.store, start, start + 8 * len(references)))
 
 
-def test_the_page_equals_sources_and_fmus(testbed, page, packed):
-    """Except for the added parts, the page in the FMU equals the page in the sources. In the FMU for FMI 3.0, the page contains the
-    modules for FMI 2.0, too."""
-    assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
+def test_the_page_contains_the_fmus(testbed, page, packed):
+    """The page has the same text in both FMI versions. In the FMU for FMI 3.0, it contains the modules for FMI 2.0, too."""
     directory = testbed.parents[testbed.parent.name == "fmi3"]
+    assert text_of(testbed) == text_of(directory / testbed.name)
     for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):
         description, module = packed[2 * offset : 2 * offset + 2]
         with zipfile.ZipFile(directory / name) as archive:
@@ -106,7 +98,6 @@ def test_the_page_equals_sources_and_fmus(testbed, page, packed):
 
 def test_the_controllers_page_runs_it(controller):
     page = page_of(controller)
-    assert LIVE.sub("", page) == (ROOT / CONTROLLER.path).read_text(encoding="utf-8")
     script = script_of(page)
     assert len(PACKED.findall(script)) == 2 and "\n], ...[{},[]]).catch(" in script
     # The testbed that runs next to the controller has the description of the testbed's FMU, except for the guid.

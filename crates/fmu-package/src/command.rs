@@ -10,7 +10,7 @@ use crate::model::LoadedModel;
 use crate::options::BuildOptions;
 use crate::pack::{Files, Packed, Parts, pack};
 use crate::packages::workspace;
-use crate::page::{CompiledPage, Page};
+use crate::page::Page;
 use crate::page_html::PAGE;
 use crate::platform::Platform;
 use crate::sources::{DESCRIPTION, Sources};
@@ -129,25 +129,31 @@ impl Builder {
             join_for_macos(&mut libraries)?;
         }
         // The page runs the FMU for FMI 2.0, so all variables must have types of FMI 2.0.
-        let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
-        let page = match options.no_page || options.c_sources || !can_have_page {
+        let can_run_in_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
+        let of_page = match can_run_in_page {
+            true => self.describe(&model, Standard::Fmi2, &changes)?,
+            false => descriptions[0].1.clone(),
+        };
+        let written = self.page.written(&of_page, &content)?;
+        let page = match options.no_page || options.c_sources || !can_run_in_page {
             true => None,
-            false => {
-                let made = descriptions.iter().find(|(fmi, _)| *fmi == Standard::Fmi2);
-                let describe = || self.describe(&model, Standard::Fmi2, &changes);
-                let description = made.map_or_else(describe, |(_, description)| Ok(description.clone()))?;
-                self.page.compile(&self.build(), description)?
+            false => self.page.compile(&self.build(), of_page)?,
+        };
+        let html = |guid: &str| -> Result<Option<Vec<u8>>> {
+            match &page {
+                Some(page) => {
+                    page.html(written.as_deref(), guid, &starts, &model.table.info, &content).map(Some)
+                }
+                None => Ok(written.clone().map(String::into_bytes)),
             }
         };
-        let html = |page: &CompiledPage, guid: &str| page.html(guid, &starts, &model.table.info, &content);
         let with_guid = |guid: &str| -> Result<Files> {
-            let sources =
-                c_sources(guid)?.into_iter().map(|(name, bytes)| (format!("sources/{name}"), bytes));
-            let page = page.iter().map(|page| Ok((PAGE.to_owned(), html(page, guid)?)));
-            sources.map(Ok).chain(page).collect()
+            let mut files = c_sources(guid)?;
+            files.iter_mut().for_each(|(name, _)| name.insert_str(0, "sources/"));
+            files.extend(html(guid)?.map(|html| (PAGE.to_owned(), html)));
+            Ok(files)
         };
-        let content: Vec<_> =
-            content.iter().filter(|file| page.is_none() || file.name != PAGE).cloned().collect();
+        let content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
         let out = options.out.clone().unwrap_or_else(|| target.join("fmu"));
         for (fmi, description) in &descriptions {
             // If an FMU for FMI 2.0 has terminals, FMI Library reports a fatal mismatch, although it continues.

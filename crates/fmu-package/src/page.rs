@@ -7,14 +7,15 @@ use crate::cross::has_std;
 use crate::library::{stamp, with_stamp};
 use crate::pack::with_guid_of;
 use crate::packages::directory_of;
-use crate::page_html::{Runnable, page};
+use crate::page_html::{PAGE, Runnable, page};
 use crate::sources::DESCRIPTION;
 use crate::table::Info;
 use anyhow::{Context, Result};
 use std::fs;
 use std::path::Path;
 
-/// Additions to the page that runs an FMU in a browser. Without them, the page has plots and sliders, but not a view of the model.
+/// The page of an FMU, and additions to its part that runs the FMU in a browser. Without additions, that part has plots and
+/// sliders, but not a view of the model.
 ///
 /// ```
 /// # use fmu_package::{Builder, Page};
@@ -27,6 +28,9 @@ use std::path::Path;
 /// The README in the directory `page` of this crate describes the scripts.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
+    /// Writes `documentation/index.html` from the model description for FMI 2.0, if the page has tables of the variables or is put
+    /// together from several files. By default, the page is the file of this name among the content, if there is one.
+    pub html: Option<fn(&str) -> Result<String>>,
     /// Scripts that run after the scripts that every page has. One of them registers an add-on under the model's identifier.
     pub scripts: Vec<&'static str>,
     /// Packages in the same workspace whose FMUs the page contains, so that these scripts can run them together with the model, for
@@ -42,6 +46,17 @@ pub(crate) struct CompiledPage<'a> {
 }
 
 impl Page {
+    /// Returns the page without the part that runs the FMU: `html`, or the page among the content.
+    pub(crate) fn written(&self, description: &str, content: &[ContentFile]) -> Result<Option<String>> {
+        match (self.html, content.iter().find(|file| file.name == PAGE)) {
+            (Some(html), _) => html(description).map(Some),
+            (None, Some(ContentFile { path, .. })) => {
+                fs::read_to_string(path).map(Some).with_context(|| format!("cannot read {}", path.display()))
+            }
+            (None, None) => Ok(None),
+        }
+    }
+
     /// Compiles the model and its companions for WebAssembly. If the model cannot be compiled for WebAssembly, prints a note and returns
     /// `None`.
     pub(crate) fn compile(
@@ -76,8 +91,10 @@ impl Page {
 
 impl CompiledPage<'_> {
     /// Returns the page for an FMU with this guid and these start values. Companions keep the guid of their descriptions.
+    /// `written` is the page without the part that runs the FMU.
     pub fn html(
         &self,
+        written: Option<&str>,
         guid: &str,
         starts: &[(u32, f64)],
         info: &Info,
@@ -89,7 +106,7 @@ impl CompiledPage<'_> {
             module: with_stamp(module, guid, Some(starts))?,
         };
         let runnables: Vec<_> = std::iter::once(model).chain(self.companions.iter().cloned()).collect();
-        page(content, (&info.name, &info.description), &runnables, &self.page.scripts)
+        page(written, content, (&info.name, &info.description), &runnables, &self.page.scripts)
     }
 }
 

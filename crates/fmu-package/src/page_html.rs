@@ -48,18 +48,16 @@ pub(crate) struct Runnable {
     pub module: Vec<u8>,
 }
 
-/// Returns the page that runs the FMU. It contains the page among the content, if there is one.
+/// Returns the page that runs the FMU. It contains the written page, if there is one, and the resources among the content.
 pub(crate) fn page(
+    written: Option<&str>,
     content: &[ContentFile],
     (title, about): (&str, &str),
     runnables: &[Runnable],
     scripts: &[&str],
 ) -> Result<Vec<u8>> {
-    let own = content.iter().find(|file| file.name == PAGE);
-    let page = match own {
-        Some(file) => {
-            fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?
-        }
+    let page = match written {
+        Some(page) => page.to_owned(),
         None => PLAIN.replace("{{ title }}", &escape(title)).replace("{{ description }}", &escape(about)),
     };
     let script = script(runnables, &Resources::of(content)?, scripts)?;
@@ -304,7 +302,7 @@ mod tests {
 
     #[test]
     fn a_model_without_a_page_gets_one() {
-        let page = String::from_utf8(page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap()).unwrap();
+        let page = String::from_utf8(page(None, &[], ("A & B", "Two <models>"), &[], &[]).unwrap()).unwrap();
         assert!(page.contains("<h1>A &amp; B</h1>\n<p>Two &lt;models&gt;</p>") && page.contains("<script>"));
     }
 }

@@ -7,16 +7,18 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from tools.documentation.sources import read
+
 PAGE = Path("docs/performance.md")
 RATIOS, INSTRUCTIONS = Path("dev/benches/ratios.json"), Path("dev/benches/instructions.json")
 TEMPLATE = "performance.md.j2"
 
 
 def render(project: Path) -> str:
-    """The page in Markdown. Depends on the project's files only. Raises FileNotFoundError if a file with the numbers is missing."""
+    """The page in Markdown. Depends on the project's files only. Raises UserError if a file with the numbers is missing."""
     import jinja2
 
-    ratios, counted = (json.loads((project / path).read_text(encoding="utf-8")) for path in (RATIOS, INSTRUCTIONS))
+    ratios, counted = (json.loads(read(project / path)) for path in (RATIOS, INSTRUCTIONS))
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
     runs = [[_number(pick(row[i] for row in ratios["runs"].values())) for pick in (min, max)] for i in (0, 4)]
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 from prw.errors import UserError
 
-#: Relative to the root of the repository.
+#: Relative to the root of the repository: the sources of the pages, and the model descriptions of testbed and controller.
 SOURCES = Path("docs/fmu-page")
-PROGRAMS = SOURCES / "programs"
+TESTBED = Path("modelDescription/modelDescription.xml")
+CONTROLLER = Path("crates/prw-controller") / TESTBED
 
 
 class Table(NamedTuple):
@@ -53,14 +54,3 @@ def read_table(path: Path, heading: str) -> Table:
         if len(row) != len(header):
             raise UserError(f"{path}: below “{heading}” the row of “{row[0]}” has {len(row)} cells, not {len(header)}")
     return Table(header, rows)
-
-
-def shown_unit(variable: Any) -> str:
-    """The unit of a variable in the model description; empty if the unit is 1 or missing."""
-    unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
-    return "" if unit == "1" else unit
-
-
-def format_start(variable: Any) -> str:
-    """The start value of a variable; a Real has at most eight significant digits."""
-    return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

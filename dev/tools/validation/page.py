@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import html
+import re
 
 from tools.documentation import PROJECT
-from tools.documentation.pages import TESTBED
-from tools.documentation.sources import SOURCES, Table, read, read_description
-from tools.documentation.tables import text_table
+from tools.documentation.sources import SOURCES, TESTBED, Table, read, read_description
 from tools.validation.runs import CHANGE, Row, Validation
 
 LEAD = """<p>Reference experiments, run with the testbed’s FMU in the importers that are installed here, and compared with
@@ -23,7 +22,7 @@ def page(found: Validation) -> str:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(PROJECT / SOURCES), undefined=jinja2.StrictUndefined
     )
-    description = read_description(PROJECT / TESTBED.description)
+    description = read_description(PROJECT / TESTBED)
     return environment.get_template("page.html").render(
         style=read(PROJECT / SOURCES / "style.css"),
         title="Validation of the testbed’s FMU",
@@ -88,3 +87,19 @@ def sensitivity(found: Validation) -> str:
         f"<p>Largest difference in terms of its tolerance when one parameter is {CHANGE:.0%} larger, in Co-Simulation under "
         "fmu_run. The experiment detects a change above 1.</p>" + text_table(Table(["experiment", *names], rows))
     )
+
+
+def text_table(table: Table) -> str:
+    """A table whose cells are written in Markdown, in HTML. The style sheet shows a row as a paragraph in narrow windows."""
+    rows = []
+    for row in table.rows:
+        labels = ["", *(f' data-label="{html.escape(head)}:"' for head in table.header[1:])]
+        cells = (f"<td{label if cell else ''}>{_inline(cell)}</td>" for label, cell in zip(labels, row))
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    head, body = "".join(f"<th>{html.escape(head)}</th>" for head in table.header), "\n".join(rows)
+    parts = f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>"
+    return f'<div class="scroll" tabindex="0"><table class="rows text">\n{parts}\n</table></div>'
+
+
+def _inline(text: str) -> str:
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
