@@ -285,7 +285,11 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
     print("begun", flush=True)
     try:
         fmu.run(time, start={"k1": np.full(100000, 90.0)}, outputs=["roll"], measures=["peak"])
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        runs = interrupt.runs
+        finished = np.isfinite(runs["roll", "peak"])
+        assert list(runs.errors) == np.flatnonzero(~finished).tolist() and set(runs.errors.values()) == {"cancelled"}
+        assert finished.any() == (len(time) < 1000000) and not finished.all()
         print("interrupted", flush=True)
 """
 

@@ -21,7 +21,20 @@ from fmu_run._native import FmuError, Instances, States
 from fmu_run.arguments import Log, Measure, Start
 from fmu_run.fmu import Fmu
 from fmu_run.model import Variable
-from fmu_run.runs import Event, Runs
+from fmu_run.runs import Event, Interrupted, Runs
 from fmu_run.system import System
 
-__all__ = ["Event", "Fmu", "FmuError", "Instances", "Log", "Measure", "Runs", "Start", "States", "System", "Variable"]
+__all__ = [
+    "Event",
+    "Fmu",
+    "FmuError",
+    "Instances",
+    "Interrupted",
+    "Log",
+    "Measure",
+    "Runs",
+    "Start",
+    "States",
+    "System",
+    "Variable",
+]

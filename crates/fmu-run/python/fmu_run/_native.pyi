@@ -58,6 +58,7 @@ class Loaded:
         dict[str, tuple[tuple[int, ...], list[str]]] | None,
         dict[str, NDArray[Any]],
         list[tuple[int, float, list[float], list[float]]],
+        BaseException | None,
     ]: ...
 
 def numbers(name: str, values: ArrayLike) -> _Array: ...

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fmu_run._native import Instances, Loaded, numbers
 from fmu_run.arguments import Interface, Log, Measure, Solver, Start, Trajectory
-from fmu_run.runs import Runs
+from fmu_run.runs import Interrupted, Runs
 
 _Array = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ class Model:
 
         If the FMU rejects a call or ends a run early, all other runs continue. `Runs.errors` contains the errors, and `Runs.check`
         raises the first one. A run that fails without a message is repeated with logging on after all other runs, only to get the
-        message. After Ctrl-C, each run completes its current step and stops.
+        message. After Ctrl-C, each run completes its current step and stops; the finished runs are in the exception, see below.
 
         Parameters
         ----------
@@ -179,6 +179,8 @@ class Model:
             For invalid arguments.
         FmuError
             If the FMU is closed.
+        Interrupted
+            After Ctrl-C: a KeyboardInterrupt whose attribute `runs` contains the finished runs.
 
         Examples
         --------
@@ -186,26 +188,30 @@ class Model:
         >>> runs["y"].shape
         (2, 1000)
         """
-        return Runs(
-            *self._loaded.run(
-                time,
-                outputs,
-                inputs,
-                input_derivatives,
-                start,
-                every,
-                measures,
-                threads,
-                read_before_set,
-                progress,
-                tolerance,
-                log,
-                interface,
-                solver,
-                (rtol, atol, max_step),
-                events,
-            )
+        found = self._loaded.run(
+            time,
+            outputs,
+            inputs,
+            input_derivatives,
+            start,
+            every,
+            measures,
+            threads,
+            read_before_set,
+            progress,
+            tolerance,
+            log,
+            interface,
+            solver,
+            (rtol, atol, max_step),
+            events,
         )
+        runs, raised = Runs(*found[:-1]), found[-1]
+        if isinstance(raised, KeyboardInterrupt):
+            raise Interrupted(runs) from None
+        if raised is not None:
+            raise raised
+        return runs
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
         """Convert values to the unit of a variable.

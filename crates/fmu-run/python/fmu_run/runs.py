@@ -1,4 +1,4 @@
-"""Results of runs: `Runs` and `Event`."""
+"""Results of runs: `Runs`, `Event` and `Interrupted`."""
 
 from __future__ import annotations
 
@@ -287,6 +287,20 @@ class Runs(Mapping[str, _Array]):
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""
         failed = f", {len(self._errors)} failed" if self._errors else ""
         return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C has stopped `Fmu.run`.
+
+    Parameters
+    ----------
+    runs
+        The results. A run that was not finished has the error "cancelled", and its values are NaN.
+    """
+
+    def __init__(self, runs: Runs):
+        super().__init__()
+        self.runs = runs
 
 
 def _column(values: Any) -> NDArray[Any]:

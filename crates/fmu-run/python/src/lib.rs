@@ -62,7 +62,7 @@ type Stages = Vec<Pairs>;
 type Messages = Vec<(usize, String)>;
 /// Stored times; names of outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics);
 /// errors; notes; start values; shapes and element names of whole arrays; values that float64 cannot represent, (runs, times) by
-/// output; events, each with run, time, and outputs before and after.
+/// output; events, each with run, time, and outputs before and after; the exception that has stopped the runs.
 type Results<'py> = (
     Bound<'py, PyAny>,
     Vec<String>,
@@ -75,6 +75,7 @@ type Results<'py> = (
     Option<Bound<'py, PyDict>>,
     Bound<'py, PyDict>,
     Vec<(usize, f64, Vec<f64>, Vec<f64>)>,
+    Option<PyErr>,
 );
 
 fn python(error: Error) -> PyErr {
@@ -273,14 +274,27 @@ impl Loaded {
         let mut measured = (!measures.is_empty()).then(|| array(size.measures)).transpose()?;
         let measured_values = measured.as_mut().map_or(&mut [][..], |(_, output)| output.values());
         let results = [kept.values(), measured_values];
-        let Finished { errors, notes, exact, events } =
+        let (Finished { errors, notes, exact, events }, raised) =
             perform(py, &planned, results, progress.map(Bound::unbind), log)?;
         let exact = exact_outputs(py, &model, &planned, &exact)?;
         let measured = measured.map(|(array, _)| array);
         let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
         let events =
             events.into_iter().map(|event| (event.run, event.time, event.before, event.after)).collect();
-        Ok((times, outputs, trajectories, measures, measured, errors, notes, start, arrays, exact, events))
+        Ok((
+            times,
+            outputs,
+            trajectories,
+            measures,
+            measured,
+            errors,
+            notes,
+            start,
+            arrays,
+            exact,
+            events,
+            raised,
+        ))
     }
 }
 
@@ -358,14 +372,14 @@ fn order_of(name: &Bound<'_, PyAny>) -> PyResult<Order> {
 }
 
 /// Performs the runs without the GIL. About ten times per second, this thread handles Python signals, passes on messages and calls
-/// `progress`.
+/// `progress`. If one of them raises an exception, the runs stop, and it is returned with the results.
 fn perform(
     py: Python,
     planned: &Planned,
     [trajectories, measures]: [&mut [f64]; 2],
     progress: Option<Py<PyAny>>,
     log: Option<Log>,
-) -> PyResult<Finished> {
+) -> PyResult<(Finished, Option<PyErr>)> {
     let (raised, runs) = (Arc::new(Mutex::new(None)), planned.size().runs);
     let error = Arc::clone(&raised);
     let log = log.map(Arc::new);
@@ -387,7 +401,7 @@ fn perform(
     let result = py.detach(|| planned.run(&watch, trajectories, measures));
     let rest = log.map_or(Ok(()), |log| log.pass(py, watch.take_messages()));
     let raised = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
-    rest.and_then(|()| raised.map_or_else(|| result.map_err(python), Err))
+    Ok((result.map_err(python)?, raised.or(rest.err())))
 }
 
 /// Converts an argument to a NumPy array of float64.

@@ -196,6 +196,9 @@ impl System {
         let [mut trajectories, mut measures] = [zeros(size.trajectories())?, zeros(size.measures())?];
         let Finished { errors, notes, exact, events } =
             planned.run(watch, &mut trajectories, &mut measures)?;
+        if watch.is_cancelled() && watch.done() < size.runs {
+            return Err(Error::Cancelled);
+        }
         Ok(Runs { size, trajectories, measures, exact, errors, notes, events })
     }
 
@@ -249,8 +252,10 @@ impl Planned<'_> {
     /// Performs the runs. Writes trajectories and statistics to the caller's memory, in the layout of [`Runs`], and returns the other
     /// results.
     ///
+    /// If the caller cancels the runs, the unfinished ones are errors of the result, and their values are NaN.
+    ///
     /// # Errors
-    /// Same errors as [`System::run`].
+    /// Same errors as [`System::run`], except [`Error::Cancelled`].
     ///
     /// # Panics
     /// Panics if a slice is too short.

@@ -53,6 +53,7 @@ pub(super) fn run(
             let Row { run, trajectories, measures } = row;
             let result = worker.run(run, plan.time, trajectories, measures);
             if watch.is_cancelled() {
+                failures.push(cancelled(Row { run, trajectories, measures }));
                 break;
             }
             match result {
@@ -66,16 +67,13 @@ pub(super) fn run(
         worker.finish();
         ((failures, notes), (exact, events))
     })?;
-    drop(rows);
-    if watch.is_cancelled() && watch.done() < plan.runs {
-        return Err(Error::Cancelled);
-    }
+    let left: Vec<_> = rows.into_inner().unwrap_or_else(PoisonError::into_inner).map(cancelled).collect();
     let (found, more): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let (exact, events): (Vec<_>, Vec<_>) = more.into_iter().unzip();
     let mut events: Vec<_> = events.into_iter().flatten().collect();
     events.sort_by_key(|event| event.run);
     let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    let mut failures: Vec<_> = failures.into_iter().flatten().collect();
+    let mut failures: Vec<_> = failures.into_iter().flatten().chain(left).collect();
     let mut notes: Messages = notes.into_iter().flatten().collect();
     failures.sort_unstable_by_key(|(run, _)| *run);
     notes.sort_unstable_by_key(|(run, _)| *run);
@@ -85,6 +83,13 @@ pub(super) fn run(
     }
     let errors = failures.into_iter().map(|(run, failure)| (run, failure.text)).collect();
     Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()), events })
+}
+
+/// Records that a run was not finished, because the caller has cancelled the runs.
+fn cancelled(row: Row) -> (usize, Failure) {
+    row.trajectories.fill(f64::NAN);
+    row.measures.fill(f64::NAN);
+    (row.run, Failure { at: None, text: "cancelled".to_owned(), is_silent: false })
 }
 
 /// Sorts the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
