@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.stats import norm, qmc
 
 import prw
+from prw.errors import Interrupted
 from prw.motion import fig4
 from prw.testbed import OUTPUTS, Testbed
 
 
 def rows(directory):
     return pq.read_table(directory / "runs.parquet").to_pylist()
+
+
+def files(directory):
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
 
 
 def test_grid_random_and_failures(prw, tmp_path, fmu):
@@ -38,7 +49,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 
 def test_dask_cluster(prw, tmp_path):
     """The runs are divided into several tasks, and all runs of the last task fail."""
-    arguments = ["sweep", "--grid", "k1=150:-50:3", "--random", "c3=20%", "--runs", 20]
+    arguments = ["sweep", "--grid", "k1=150:-50:3", "--random", "c3=20%", "--runs", 20, "--trajectories", 500]
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         address = cluster.scheduler_address
@@ -46,7 +57,7 @@ def test_dask_cluster(prw, tmp_path):
     assert result.returncode == 0, result.stderr
     assert f"60 runs on {address}" in result.stdout
     assert prw(*arguments, "--out", "local").returncode == 0
-    assert rows(tmp_path / "remote") == rows(tmp_path / "local")
+    assert files(tmp_path / "remote") == files(tmp_path / "local")
 
 
 @pytest.mark.parametrize(
@@ -58,6 +69,16 @@ def test_dask_cluster(prw, tmp_path):
         (["--random", "k1=5"], "--random k1=5: write NAME=10%"),
         (["--random", "k1=5%", "--runs", "0"], "--runs 0: must be an integer of at least 1"),
         (["--random", "k1=5%", "--input", "none.csv"], "none.csv: cannot be read"),
+        (["--random", "k1=5%", "--sampling", "sobol"], "--runs 1000: must be a power of 2 with sobol, such as 1024"),
+        (["--random", "k1=5%", "--outputs", "yaw"], "--outputs: yaw is not known; there are theta1"),
+        (["--random", "k1=5%", "--statistics", "median"], "--statistics: median is not known; there are min, max"),
+        (["--random", "k1=5%", "--trajectories", "0"], "--trajectories 0: must be an integer of at least 1"),
+        (["--random", "k1=5%", "--identified", "a.json"], "--identified: replaces --random; choose one"),
+        (["--identified", "a.json"], "--identified: a.json cannot be read (No such file or directory)"),
+        (["--table", "a.csv", "--grid", "k1=1:2:3"], "--table: replaces grid and random; choose one"),
+        (["--table", "a.csv"], "--table: a.csv cannot be read"),
+        (["--again", "a.parquet"], "a.parquet: cannot be read"),
+        (["--again", "a.parquet", "--grid", "k1=1:2:3"], "--again a.parquet: repeats a sweep with its own arguments"),
     ],
 )
 def test_wrong_options(prw, tmp_path, arguments, message):
@@ -93,3 +114,133 @@ def test_spreads_fixed_values_and_units(fmu):
     ]:
         with pytest.raises(prw.UserError, match=message_part):
             prw.sweep(fmu=fmu, **arguments)
+
+
+SWEEP = {
+    "random": {"k1": 0.1, "c3": 0.2},
+    "runs": 50,
+    "outputs": "roll",
+    "statistics": ["max", "end"],
+    "trajectories": 100,
+}
+
+#: Kills the process before it renames the file with this number. Then the file exists under a temporary name.
+KILLED = f"""
+import os, signal, sys, prw
+rename, left = os.replace, [int(sys.argv[1])]
+def replace(*paths):
+    if left[0] == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    left[0] -= 1
+    rename(*paths)
+os.replace = replace
+prw.sweep(**{SWEEP}, fmu=sys.argv[2], out=sys.argv[3])
+"""
+
+
+def test_a_killed_sweep_continues(tmp_path, fmu):
+    """There are 4 parts with 2 files each, then the table. The killed processes have finished 0, 1, 2 and 1 parts."""
+    for renamed in (0, 3, 4, 2):
+        ended = subprocess.run([sys.executable, "-c", KILLED, str(renamed), fmu, tmp_path / "killed"], timeout=120)
+        assert ended.returncode == -signal.SIGKILL
+    assert not (tmp_path / "killed" / "runs.parquet").exists()
+    table = prw.sweep(**SWEEP, fmu=fmu, out=tmp_path / "killed")
+    assert table.equals(prw.sweep(**SWEEP, fmu=fmu, out=tmp_path / "whole"))
+    assert files(tmp_path / "killed") == files(tmp_path / "whole")
+    assert table.column_names == ["run", "status", "message", "k1", "c3", "roll_max", "roll_end"]
+    kept = pq.read_table(tmp_path / "whole" / "trajectories").to_pandas()
+    run = prw.simulate(parameters={name: table[name][37].as_py() for name in ("k1", "c3")}, fmu=fmu)
+    assert np.array_equal(kept[kept["run"] == 37]["roll"], run["roll"][::100])
+    assert np.array_equal(kept[kept["run"] == 37]["time"], run.time[::100])
+    for changed, message in [
+        ({"seed": 1}, "seed was 0 and is 1"),
+        ({"statistics": "max"}, r'statistics was \["max", "end"\] and is \["max"\]'),
+        ({"motion": fig4(2e-3)}, "motion: sha256 was"),
+    ]:
+        with pytest.raises(
+            prw.UserError, match=rf"is from a sweep with other arguments \({message}.*another directory"
+        ):
+            prw.sweep(**{**SWEEP, **changed}, fmu=fmu, out=tmp_path / "killed")
+    assert files(tmp_path / "killed") == files(tmp_path / "whole")
+
+
+def test_an_interrupted_sweep_keeps_the_finished_runs(tmp_path, fmu, monkeypatch):
+    from prw import sweeps
+
+    def interrupted(testbed, request, values, *others):
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        calls.append(values)
+        return run_part(testbed, request, values, *others)
+
+    run_part, calls = sweeps.run_part, []
+    monkeypatch.setattr(sweeps, "run_part", interrupted)
+    for out, message in ((None, "32 of 50 runs are finished"), (tmp_path, "32 of 50.*start the same sweep again")):
+        calls.clear()
+        with pytest.raises(Interrupted, match=message) as caught:
+            prw.sweep(**{**SWEEP, "trajectories": None}, fmu=fmu, out=out)
+        assert caught.value.table["run"].to_pylist() == list(range(32))
+
+
+def test_a_sweep_is_repeated_from_its_file(prw, tmp_path, fmu):
+    arguments = ["--random", "k1=10%", "--sampling", "latin", "--runs", 20, "--outputs", "roll", "--statistics", "max"]
+    assert prw("sweep", *arguments, "--out", "first").returncode == 0
+    result = prw("sweep", "--again", "first/runs.parquet")
+    assert result.returncode == 0 and "all values are equal" in result.stdout, result.stderr
+    assert files(tmp_path / "first") == files(tmp_path / "out" / "sweep-again")
+    record = json.loads(pq.read_schema(tmp_path / "first" / "runs.parquet").metadata[b"prw.sweep"])
+    assert record["seed"] == 0 and record["random"] == {"k1": 0.1} and record["motion"]["name"] == "fig4"
+    assert set(record["versions"]) == {"prw", "fmu-run", "numpy", "scipy"} and record["fmu"]["guid"]
+    (tmp_path / "still.csv").write_text("time,theta1,theta2\n0,0,0\n1,0,0\n")
+    result = prw("sweep", "--again", "first/runs.parquet", "--input", "still.csv", "--out", "other")
+    assert "--input: the sweep had another motion, fig4; give that motion, not still" in result.stderr
+
+
+@pytest.mark.parametrize("sampling", ["latin", "sobol"])
+def test_even_sampling(fmu, sampling):
+    """Every combination of the grid has evenly distributed points. Independent ones would fail, with a discrepancy of about 0.01."""
+    spreads = {"k1": ("uniform", 100.0, 120.0), "k2": ("normal", 50.0, 2.0)}
+    table = prw.sweep(
+        {"c3": [0.2, 0.3]}, spreads, runs=64, sampling=sampling, outputs="roll", statistics="end", fmu=fmu
+    )
+    k1, k2 = (table[name].to_numpy().reshape(2, 64) for name in ("k1", "k2"))
+    for each in np.stack([(k1 - 100) / 20, norm.cdf(k2, 50, 2)], axis=2):
+        for column in each.T:
+            assert sorted(np.floor(64 * column).astype(int)) == list(range(64)), "each of 64 intervals has one point"
+        assert qmc.discrepancy(each) < 2e-3
+    assert not np.array_equal(k1[0], k1[1])
+
+
+def test_parameters_of_an_identification_and_from_a_table(fmu, tmp_path):
+    """The draws have the errors and the correlation of the estimates; the other parameters have the values of the fit."""
+    report = {
+        "identified": True,
+        "correlation": {"names": ["k1", "c1", "gain of tau1"], "matrix": [[1, 0.68, 0], [0.68, 1, 0], [0, 0, 1]]},
+        "parameters": {
+            "k1": {"value": 110.0, "relative_standard_error": 0.02},
+            "c1": {"value": 0.5, "relative_standard_error": 0.05},
+            "c2": {"value": 0.3},
+        },
+    }
+    path, few = tmp_path / "report.json", {"outputs": "roll", "statistics": "end", "fmu": fmu}
+    path.write_text(json.dumps(report))
+    found = prw.sweep(random=path, runs=2048, sampling="sobol", **few)
+    logarithms = np.log([found["k1"].to_numpy() / 110, found["c1"].to_numpy() / 0.5])
+    assert logarithms.std(axis=1) == pytest.approx([0.02, 0.05], rel=0.02)
+    assert np.corrcoef(logarithms)[0, 1] == pytest.approx(0.68, abs=0.01)
+    table = {name: found[name].to_numpy()[:5] for name in ("k1", "c1")}
+    again = prw.sweep(table=table, parameters={"c2": 0.3}, **few)
+    assert again["roll_end"].to_pylist() == found["roll_end"].to_pylist()[:5]
+    path.write_text(json.dumps({**report, "identified": False}))
+    for arguments, message in [
+        ({"random": path}, "random: the data did not determine the parameters"),
+        ({"random": {}}, "nothing varies"),
+        ({"random": 3}, "3 is neither a dict of distributions"),
+        ({"table": {"run": [1]}}, "table: run is not known; there are J2"),
+        ({"table": {"k1": [1.0], "k2": [1.0, 2.0]}}, "equally long columns"),
+        ({"table": {"k1": [1.0, np.nan]}}, "table: k1 has values that are not finite"),
+        ({"table": {"k1": [1.0]}, "parameters": {"k1": 1.0}}, "table: k1 is also in parameters"),
+        ({"grid": {"k1": 1.0}, "trajectories": 1}, "trajectories: are written into a directory; give it as out"),
+    ]:
+        with pytest.raises(prw.UserError, match=message):
+            prw.sweep(**few, **arguments)

@@ -1,32 +1,67 @@
-"""Statistics of many runs of the testbed, for `prw.sweeps` in this process and for `prw.cluster` on the workers of a cluster."""
+"""A part of the runs of a sweep, for `prw.sweeps` in this process and for `prw.cluster` on the workers of a cluster."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import fmu_run
 
 from prw.motion import Array, Motion
-from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
-
-#: The statistics of each output in a result.
-MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Statistics by the name of the column, each an array with one value per run; and the messages of failed runs, by run.
-Statistics = tuple[dict[str, Array], dict[int, str]]
+from prw.testbed import Testbed, driven_by, stopped
 
 
-def statistics(
+class Request(NamedTuple):
+    """What all runs of a sweep have in common.
+
+    Attributes
+    ----------
+    motion
+        The motion of the motors.
+    fixed
+        Start values that are the same in all runs, by name.
+    outputs, statistics
+        Names of outputs and of their statistics.
+    every
+        Trajectories have every `every`-th sample; None if they are not kept.
+    """
+
+    motion: Motion
+    fixed: Mapping[str, Any]
+    outputs: tuple[str, ...]
+    statistics: tuple[fmu_run.Measure, ...]
+    every: int | None
+
+
+class Part(NamedTuple):
+    """Results of some runs.
+
+    Attributes
+    ----------
+    measured
+        Statistics (runs,) by the name of the column.
+    errors
+        Messages of failed runs by their index in the part.
+    trajectories
+        (runs, times) by output, and `time`, (times,) in s; empty if they are not kept.
+    """
+
+    measured: dict[str, Array]
+    errors: dict[int, str]
+    trajectories: dict[str, Array]
+
+
+def run_part(
     testbed: Testbed,
-    motion: Motion,
-    start: Mapping[str, Any],
+    request: Request,
+    values: Mapping[str, Array],
     threads: int,
     progress: Callable[[int, int], None] | None = None,
-) -> Statistics:
-    """The statistics of runs with the start values `start`: for each name one value for all runs, or an array with one
-    value per run."""
-    runs = testbed.loaded.run(
-        motion.time, outputs=OUTPUTS, measures=MEASURES, threads=threads, progress=progress, **driven_by(motion, start)
-    )
+) -> Part:
+    """Carry out the runs with these values of parameters, (runs,) by name."""
+    driven = driven_by(request.motion, {**request.fixed, **values})
+    chosen: dict[str, Any] = {"outputs": request.outputs, "measures": request.statistics, "every": request.every}
+    runs = testbed.loaded.run(request.motion.time, **chosen, threads=threads, progress=progress, **driven)
     errors = {run: stopped(message) for run, message in runs.errors.items()}
-    return {f"{name}_{measure}": runs[name, measure] for name in OUTPUTS for measure in MEASURES}, errors
+    measured = {f"{name}_{which}": runs[name, which] for name in request.outputs for which in request.statistics}
+    return Part(measured, errors, {"time": runs.time, **runs} if request.every else {})

@@ -55,8 +55,9 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
         option = {**OPTIONS, **arguments.options}.get(error.argument, default)
         print(f"{program} {arguments.command}: {one_line(option)}{error.detail}", file=sys.stderr)
         return error.status
-    except KeyboardInterrupt:
-        print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        what = f"; {interrupt}" if str(interrupt) else ""
+        print(f"\n{program} {arguments.command}: interrupted{what}", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # The reader has closed the pipe (`prw ... | head`); a write at exit would raise again.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import atexit
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Generator, Mapping
 from concurrent.futures import as_completed
 from functools import lru_cache
 from pathlib import Path
@@ -12,63 +12,56 @@ from typing import Any
 
 import numpy as np
 
-from prw.batch import MEASURES, Statistics, statistics
+from prw.batch import Part, Request, run_part
 from prw.errors import UserError
-from prw.motion import Array, Motion
-from prw.testbed import OUTPUTS, Testbed
+from prw.motion import Array
+from prw.testbed import Testbed
 
 #: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
-#: Number of tasks, unless they would then have fewer than SHORTEST or more than LONGEST runs.
-TASKS = 16
-#: Minimum and maximum number of runs in a task.
-SHORTEST, LONGEST = 16, 256
 
 
 def on_cluster(
-    fmu: Path,
-    motion: Motion,
-    fixed: Mapping[str, Any],
-    values: Mapping[str, Array],
-    address: str,
-    progress: Callable[[int], None],
-) -> Statistics:
-    """The statistics of runs on the Dask cluster at `address`. A task that fails is tried twice more, and a task whose worker
-    dies is tried again as often as Dask's settings allow; then its runs are recorded as failed. Raises UserError if the
-    cluster does not respond, has no workers, or its workers lack a package."""
-    total = len(next(iter(values.values())))
-    measured = {f"{name}_{measure}": np.full(total, np.nan) for name in OUTPUTS for measure in MEASURES}
-    errors: dict[int, str] = {}
-    done = 0
+    fmu: Path, request: Request, values: Mapping[str, Array], parts: Mapping[int, slice], address: str
+) -> Generator[tuple[int, Part], None, None]:
+    """Yield the index and the results of each part of the runs as soon as it is finished on the Dask cluster at `address`. A part that
+    fails is tried twice more, and a part whose worker dies is tried again as often as Dask's settings allow; then its runs are recorded
+    as failed. Raises UserError if the cluster does not respond, has no workers, or its workers lack a package."""
     client = _connect(address)
     try:
-        shared = client.scatter((fmu.read_bytes(), motion, dict(fixed)), broadcast=True, hash=False)
+        shared = client.scatter((fmu.read_bytes(), request), broadcast=True, hash=False)
         executor = client.get_executor(retries=2)
-        size = min(max(-(-total // TASKS), SHORTEST), LONGEST)
-        parts = [slice(first, min(first + size, total)) for first in range(0, total, size)]
-        futures = {executor.submit(_on_worker, shared, {n: v[part] for n, v in values.items()}): part for part in parts}
-        for future in as_completed(futures):
-            part, error = futures[future], future.exception()
+        futures = {
+            executor.submit(_on_worker, shared, {n: v[part] for n, v in values.items()}): index
+            for index, part in parts.items()
+        }
+        for future in as_completed(list(futures)):
+            index, error = futures.pop(future), future.exception()
             if isinstance(error, ImportError):
                 raise UserError(f"{address}: its workers lack a package ({error}); install prw on them")
-            if error is None:
-                found, failed = future.result()
-                errors |= {part.start + run: message for run, message in failed.items()}
-                for name, column in found.items():
-                    measured[name][part] = column
-            else:
-                errors |= dict.fromkeys(range(part.start, part.stop), f"lost on the cluster: {error}")
-            done += part.stop - part.start
-            progress(done)
+            yield (
+                index,
+                future.result() if error is None else _lost(request, parts[index], f"lost on the cluster: {error}"),
+            )
     finally:
         client.close()
-    return measured, errors
 
 
-def _on_worker(shared: tuple[bytes, Motion, Mapping[str, Any]], values: Mapping[str, Array]) -> Statistics:
-    fmu, motion, fixed = shared
+def _lost(request: Request, runs: slice, message: str) -> Part:
+    count = runs.stop - runs.start
+    kept = request.motion.time[:: request.every] if request.every else np.empty(0)
+    names = request.outputs if request.every else ()
+    return Part(
+        {f"{name}_{which}": np.full(count, np.nan) for name in request.outputs for which in request.statistics},
+        dict.fromkeys(range(count), message),
+        {"time": kept, **{name: np.full((count, len(kept)), np.nan) for name in names}} if names else {},
+    )
+
+
+def _on_worker(shared: tuple[bytes, Request], values: Mapping[str, Array]) -> Part:
+    fmu, request = shared
     # A worker runs one task per thread at a time, so each task uses one thread.
-    return statistics(_loaded(fmu), motion, {**fixed, **values}, threads=1)
+    return run_part(_loaded(fmu), request, values, threads=1)
 
 
 @lru_cache(maxsize=1)

@@ -52,6 +52,22 @@ class DoesNotFit(UserError):
     status = 3
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C has stopped a sweep.
+
+    Parameters
+    ----------
+    message
+        What is finished.
+    table
+        The table of the finished runs as in the result of the sweep, or None if there are none.
+    """
+
+    def __init__(self, message: str, table: Any):
+        super().__init__(message)
+        self.table = table
+
+
 def need(*packages: str) -> None:
     """Raise MissingPackage unless the packages are installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]

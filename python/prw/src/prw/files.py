@@ -103,6 +103,24 @@ def replacing(path: Path) -> Iterator[Path]:
                 temporary.unlink()
 
 
+@contextlib.contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    """Lock a directory during the block, except on Windows. Creates it if necessary. Raises UserError if it cannot be created, or if
+    another process has locked it."""
+    with contextlib.ExitStack() as stack:
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            if fcntl is not None:
+                descriptor = os.open(directory, os.O_RDONLY)
+                stack.callback(os.close, descriptor)
+                _lock(descriptor)
+        except BlockingIOError:
+            raise UserError(f"{directory}: another process is writing there; wait for it, or write elsewhere") from None
+        except OSError as error:
+            raise UserError(f"{directory}: cannot be written ({error.strerror or error})") from None
+        yield
+
+
 def _lock(descriptor: int) -> None:
     """Lock a file until the process ends or closes it. Raises OSError if another process has locked it. Does
     nothing on Windows."""

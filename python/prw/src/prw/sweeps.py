@@ -3,43 +3,46 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
-import math
 import os
 import warnings
-from collections.abc import Mapping
-from numbers import Real
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast, get_args
 
-import numpy as np
+import fmu_run
 from numpy.typing import ArrayLike
 
-from prw.arguments import Given, Table, check_names, counted, in_own_unit, spread_of, values_of
-from prw.batch import statistics
-from prw.errors import UserError, need
-from prw.files import replacing
+from prw.arguments import Given, Table, check_names, counted, names_of, values_of
+from prw.batch import Part, Request, run_part
+from prw.draws import Joint, Random, joint_of, layout, tabulated
+from prw.errors import Interrupted, UserError, need
 from prw.motion import Array, Motion
+from prw.parts import Parts, digest, part_size, record_in, versions
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.testbed import Testbed, existing_fmu
+from prw.testbed import CONTINUOUS, OUTPUTS, Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
 
-MAX_RUNS = 10_000_000
-#: The distribution of a parameter, see `sweep`.
-Spread = float | tuple[float, float] | tuple[str, float, float]
+#: The default statistics of each output.
+STATISTICS: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
 
 
 def sweep(
     grid: Mapping[str, ArrayLike] | None = None,
-    random: Mapping[str, Spread] | None = None,
+    random: Random | None = None,
     *,
+    table: Table | str | os.PathLike[str] | None = None,
+    again: str | os.PathLike[str] | None = None,
     parameters: Given = None,
     runs: int = 1000,
     seed: int = 0,
+    sampling: str = "random",
+    outputs: str | Sequence[str] | None = None,
+    statistics: str | Sequence[str] | None = None,
+    trajectories: int | None = None,
     motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
     threads: int | None = None,
     scheduler: str | None = None,
@@ -56,10 +59,28 @@ def sweep(
         The distribution of each parameter, in SI: ("uniform", low, high), ("normal", mean, standard deviation) or
         ("lognormal", median, relative standard deviation). For a lognormal distribution, (median, relative) suffices,
         or only the relative standard deviation (0.1 is 10 %) if the median is the start value.
+        Or the result of `prw.identify`, or its file report.json: the estimates are then drawn with their correlation, and the
+        parameters that were not estimated have the values with which the estimates were found.
+    table
+        The parameters of each run, instead of `grid` and `random`: a DataFrame, a dict of arrays, or a CSV or Parquet file whose
+        columns are parameters in SI.
+    again
+        A file runs.parquet, whose sweep is repeated with the parameters, outputs and statistics that the file contains. `motion` and
+        `fmu` must be as in that sweep. Only `threads`, `scheduler` and `out` may be given in addition to these.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     runs, seed
         Number of random draws for each combination of the grid, and their seed.
+    sampling
+        How draws are distributed: "random", "latin" (Latin hypercube) or "sobol" (scrambled Sobol points; `runs` must be a power of
+        2). The last two cover the distribution more evenly, so that averages need fewer runs.
+    outputs
+        Names of the outputs, any Real variables (default: those of `prw.simulate`).
+    statistics
+        Statistics of each output, as for `measures` of `fmu_run.Fmu.run` (default: peak, rms and end).
+    trajectories
+        Every how many samples the outputs are written into the directory `trajectories` in `out`; by default they are not. Its
+        Parquet files have a row for each run and sample, and can be read as one data set.
     motion, fmu
         As for `prw.simulate`.
     threads
@@ -67,133 +88,168 @@ def sweep(
     scheduler
         The address of the scheduler of a Dask cluster. The simulations then run on the cluster instead of in this process.
     out
-        A directory, in which the table is written as runs.parquet.
+        A directory, in which the table is written as runs.parquet. Until then, finished runs are in its directory `parts`. If the
+        sweep is interrupted, the same call continues it; with other arguments, it raises UserError. Without `out`, the finished runs
+        are in the attribute `table` of the exception KeyboardInterrupt.
 
     Returns
     -------
     pyarrow.Table
         An Arrow table with a row for each run; its method to_pandas makes a DataFrame. The columns are `run`; `status`,
-        "done" or "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; and the parameters
-        in `grid` and `random`. Three more columns for each output have its statistics in SI. For the roll these are
-        `roll_peak`, the peak of its magnitude; `roll_rms`; and `roll_end`, its value at the end.
+        "done" or "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters that vary;
+        and the statistics of each output in SI. For the roll these are `roll_peak`, the peak of its magnitude; `roll_rms`; and
+        `roll_end`, its value at the end. The metadata of its schema contain, as JSON, the arguments, the guid of the FMU, the
+        versions of the packages and the hash of the motion.
 
     Raises
     ------
     UserError
-        An argument is out of range, a file cannot be read or written, or the cluster does not respond.
+        An argument is out of range, a file cannot be read or written, `out` contains another sweep, or the cluster does not respond.
 
     Warns
     -----
     RuntimeWarning
         All runs failed.
     """
-    need("pyarrow", *(["distributed"] if scheduler else []))
+    need("pyarrow", "scipy", *(["distributed"] if scheduler else []))
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    with Testbed(existing_fmu(fmu)) as testbed, contextlib.ExitStack() as stack:
-        fixed = values_of(parameters, testbed.loaded)
-        values, moved = layout(grid or {}, random or {}, runs, seed, testbed, fixed), motion_of(motion)
-        # The file is created first, so that a directory that cannot be written costs no runs.
-        temporary = None if out is None else stack.enter_context(replacing(Path(out) / "runs.parquet"))
-        table = _run_all(testbed, moved, values, fixed, threads, scheduler)
-        if temporary is not None:
-            import pyarrow.parquet
+    moved = motion_of(motion)
+    with Testbed(existing_fmu(fmu)) as testbed:
+        if again is not None:
+            if any(given is not None for given in (grid, random, table, parameters, outputs, statistics, trajectories)):
+                raise UserError("repeats a sweep with its own arguments; omit them", argument="again", given=again)
+            request, values, record = _recorded(Path(again), testbed, moved)
+        else:
+            fixed = values_of(parameters, testbed.loaded)
+            joint = random if random is None or isinstance(random, Mapping) else joint_of(random)
+            if isinstance(joint, Joint):
+                fixed = {**{n: v for n, v in joint.others.items() if n not in (grid or {})}, **fixed}
+            testbed.with_starts(fixed)
+            if table is None:
+                values = layout(grid or {}, joint or {}, runs, seed, sampling, testbed, fixed)
+            elif grid is not None or random is not None:
+                raise UserError("replaces grid and random; choose one", argument="table")
+            else:
+                values = tabulated(table, testbed, fixed)
+            request = _request(moved, fixed, outputs, statistics, trajectories, testbed)
+            drawn = {"runs": runs, "seed": seed, "sampling": sampling} if random is not None else {}
+            distribution = joint._asdict() if isinstance(joint, Joint) else joint
+            record = {"grid": grid, "random": distribution, **drawn, **_record(request, values, testbed)}
+        if request.every and out is None:
+            raise UserError("are written into a directory; give it as out", argument="trajectories")
+        samples = len(moved.time) * (len(request.outputs) if request.every == 1 else 1)
+        size = part_size(len(next(iter(values.values()))), samples)
+        parts = Parts(record, values, size, None if out is None else Path(out))
+        with parts.opened():
+            found = _complete(parts, testbed, request, values, threads, scheduler)
+    if "done" not in found["status"].to_pylist():
+        warnings.warn(f"all {found.num_rows} runs failed; run 0: {found['message'][0]}", RuntimeWarning, stacklevel=2)
+    return found
 
-            pyarrow.parquet.write_table(table, temporary)
-    if "done" not in table["status"].to_pylist():
-        warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
-    return table
 
-
-def _run_all(
-    testbed: Testbed,
+def _request(
     motion: Motion,
-    values: Mapping[str, Array],
     fixed: Mapping[str, Any],
-    threads: int,
-    scheduler: str | None,
-) -> pyarrow.Table:
-    """Carry out all runs and return their table. `values` has an array for each parameter that varies, with one value per
-    run; `fixed` has the values that are the same in all runs."""
-    import pyarrow as pa
+    outputs: str | Sequence[str] | None,
+    statistics: str | Sequence[str] | None,
+    trajectories: int | None,
+    testbed: Testbed,
+) -> Request:
+    names = OUTPUTS if outputs is None else names_of("outputs", outputs)
+    chosen = STATISTICS if statistics is None else names_of("statistics", statistics)
+    known = testbed.loaded.variables
+    check_names("outputs", names, [name for name in known if known[name].type in CONTINUOUS])
+    check_names("statistics", chosen, get_args(fmu_run.Measure))
+    for argument, given in (("outputs", names), ("statistics", chosen)):
+        if not given or len(set(given)) != len(given):
+            raise UserError("needs at least one name, and each only once", argument=argument)
+    every = None if trajectories is None else counted("trajectories", trajectories)
+    return Request(motion, fixed, names, cast("tuple[fmu_run.Measure, ...]", chosen), every)
 
-    start, total = {**fixed, **values}, len(next(iter(values.values())))
-    with Progress(f"{total} runs", total) as progress:
-        if scheduler:
+
+def _record(request: Request, values: Mapping[str, Array], testbed: Testbed) -> dict[str, Any]:
+    """The part of the record that does not depend on how the values were chosen."""
+    motion = request.motion
+    return {
+        "parameters": dict(request.fixed),
+        "outputs": request.outputs,
+        "statistics": request.statistics,
+        "trajectories": request.every,
+        "varied": list(values),
+        "values": digest(*values.values()),
+        "motion": {"name": motion.name, "sha256": digest(motion.time, motion.theta, motion.omega)},
+        "fmu": {"guid": testbed.loaded.token},
+        "versions": versions(),
+    }
+
+
+def _recorded(path: Path, testbed: Testbed, motion: Motion) -> tuple[Request, dict[str, Array], dict[str, Any]]:
+    """The sweep whose result is a file. Raises UserError if the motion or the FMU are not those of the sweep."""
+    from pyarrow import parquet
+
+    record = record_in(path)
+    values = {
+        name: column.to_numpy()
+        for name, column in zip(record["varied"], parquet.read_table(path, columns=record["varied"]))
+    }
+    chosen = tuple(record["outputs"]), tuple(record["statistics"])
+    request = Request(motion, record["parameters"], *chosen, record["trajectories"])
+    now = _record(request, values, testbed)
+    if record["motion"]["sha256"] != now["motion"]["sha256"]:
+        raise UserError(
+            f"the sweep had another motion, {record['motion']['name']}; give that motion, not {motion.name}",
+            argument="motion",
+        )
+    if record["fmu"] != now["fmu"]:
+        raise UserError(
+            f"the sweep ran the FMU with the guid {record['fmu']['guid']}, {testbed.fmu} is another one", argument="fmu"
+        )
+    return request, values, {**record, "versions": now["versions"]}
+
+
+def _complete(
+    parts: Parts, testbed: Testbed, request: Request, values: Mapping[str, Array], threads: int, scheduler: str | None
+) -> pyarrow.Table:
+    """Carry out the missing runs, and return the table of all."""
+    missing = parts.missing()
+    done = parts.runs - sum(part.stop - part.start for part in missing.values())
+    with Progress(f"{parts.runs} runs", parts.runs) as progress, contextlib.ExitStack() as stack:
+        if not missing:
+            results: Iterator[tuple[int, Part]] = iter(())
+        elif scheduler:
             from prw.cluster import on_cluster
 
-            measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
+            results = stack.enter_context(
+                contextlib.closing(on_cluster(testbed.fmu, request, values, missing, scheduler))
+            )
         else:
-            measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
-    failed = np.isin(np.arange(total), list(errors))
-    columns = {
-        "run": pa.array(range(total), pa.int64()),
-        "status": np.where(failed, "failed", "done").tolist(),
-        "message": [errors.get(run, "") for run in range(total)],
-        **values,
-        **{name: pa.array(column, mask=failed) for name, column in measured.items()},
-    }
-    return pa.table(columns)
+            results = (
+                (
+                    k,
+                    run_part(
+                        testbed,
+                        request,
+                        {n: v[part] for n, v in values.items()},
+                        threads,
+                        lambda now, _: progress(done + now),
+                    ),
+                )
+                for k, part in missing.items()
+            )
+        try:
+            for index, found in results:
+                parts.keep(index, found)
+                done += missing[index].stop - missing[index].start
+                progress(done)
+        except KeyboardInterrupt:
+            more = "; start the same sweep again to continue" if parts.are_on_disk else ""
+            raise Interrupted(f"{done} of {parts.runs} runs are finished{more}", parts.table()) from None
+    return parts.finish()
 
 
-def layout(
-    grid: Mapping[str, ArrayLike],
-    random: Mapping[str, Spread],
-    runs: int,
-    seed: int,
-    testbed: Testbed,
-    fixed: Mapping[str, Any],
-) -> dict[str, Array]:
-    """The values of each parameter that varies, one value per run: all combinations of the grid, each with its own draws. If
-    only a relative standard deviation is given, the median is the value in `fixed` or the FMU's start value. Raises UserError for
-    invalid arguments."""
-    testbed.with_starts(fixed)
-    starts = {**testbed.starts, **fixed}
-    check_names("grid", grid, testbed.starts)
-    check_names("random", random, testbed.starts)
-    for name in (*grid, *random):
-        if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
-            raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
-    if not grid and not random:
-        raise UserError("nothing varies; give values of a parameter (grid) or its distribution (random)")
-    draws = counted("runs", runs) if random else 1
-    axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
-    total = math.prod(map(len, axes.values())) * draws
-    if total > MAX_RUNS:
-        raise UserError(f"{total} runs are more than the limit of {MAX_RUNS}; give fewer values (grid) or draws (runs)")
-    combinations = np.array(list(itertools.product(*axes.values())), dtype=np.float64).reshape(
-        total // draws, len(axes)
-    )
-    table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
-    generator = np.random.default_rng(seed)
-    for name, spread in random.items():
-        table[name] = drawn(name, spread, starts[name], generator, total)
-    return table
+def repeated(before: str | os.PathLike[str], now: pyarrow.Table) -> list[str]:
+    """Names of the columns in which the table of a repeated sweep differs from the file of the earlier one."""
+    from pyarrow import parquet
 
-
-def drawn(name: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
-    """Draw values (count,) from a distribution, see `sweep`. Raises UserError for an invalid distribution."""
-    kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
-    if kind == "lognormal":
-        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
-        return median * np.exp(relative * generator.standard_normal(count))
-    finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
-    one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
-    if kind == "uniform" and one < other:
-        return generator.uniform(one, other, count)
-    if kind == "normal" and other > 0:
-        return generator.normal(one, other, count)
-    raise UserError(
-        f'{name} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)',
-        argument="random",
-    )
-
-
-def _column(name: str, values: Any) -> Array:
-    try:
-        column = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    except (TypeError, ValueError):
-        column = np.empty(0)
-    # The range is not checked here: if the FMU rejects a value, only the runs with this value fail.
-    if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
-        raise UserError(f"{name} must have one or more finite numbers as values, not {values!r}")
-    return column
+    earlier = parquet.read_table(before)
+    return [name for name in now.column_names if not now[name].equals(earlier[name])]

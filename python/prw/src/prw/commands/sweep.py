@@ -1,8 +1,8 @@
 """Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster. Writes one row for
-each run into runs.parquet: the run's parameters, and each output's peak, rms and value at the end (SI).
+each run into runs.parquet: the run's parameters, and statistics of each output (SI).
 
 The values of --grid are run in all combinations. For each combination, the parameters of --random are drawn --runs times.
-A run that fails is recorded with its message.
+A run that fails is recorded with its message. If the command is interrupted, the same command continues it.
 """
 
 from __future__ import annotations
@@ -14,18 +14,25 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.commands.options import Named, add_paths, call, spread
+from prw.commands.options import DEFAULT_OUT, Named, add_paths, call, listed, spread
+from prw.draws import SAMPLINGS
+from prw.errors import UserError, need
 from prw.motion import Array, fig4
+from prw.parts import TABLE, TRAJECTORIES, finished_runs
 from prw.recording import read_motion
-from prw.sweeps import sweep
+from prw.sweeps import STATISTICS, repeated, sweep
+from prw.testbed import OUTPUTS
 
 HELP = "run the FMU with many sets of parameters"
 EXAMPLES = """\
 examples:
   prw sweep --grid k1=60:240:13 --grid c3=0.1:0.8:8           104 combinations, in the experiment of Fig. 4
   prw sweep --random k1=10% --random k2=10% --runs 5000       Monte Carlo, 10 % (one sigma) about the start values
+  prw sweep --identified out/identified/report.json --sampling sobol --runs 1024     correlated, as identified
   prw sweep --random J3=5% --runs 2000 --input motors.csv     in your recorded motion
+  prw sweep --random k1=10% --outputs roll --trajectories 10  with every tenth sample of the roll of each run
   prw sweep --random k1=10% --runs 100000 --scheduler tcp://head:8786      on a Dask cluster (prw installed there)
+  prw sweep --again old/runs.parquet --out new                repeat a sweep from its file
 then:
   python -c "import pyarrow.parquet as pq; print(pq.read_table('out/sweep/runs.parquet').column_names)"
 """
@@ -56,7 +63,43 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="log-normal about VALUE in SI (default: the start value). May be repeated",
     )
     parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
+    parser.add_argument(
+        "--identified",
+        type=Path,
+        metavar="FILE",
+        help="report.json of `prw identify`; draws its estimates with their correlation, instead of --random",
+    )
+    parser.add_argument(
+        "--table",
+        type=Path,
+        metavar="FILE",
+        help="CSV or Parquet file with the parameters of each run in SI, as columns",
+    )
+    parser.add_argument(
+        "--again", type=Path, metavar="FILE", help="a runs.parquet whose sweep is repeated, and compared with it"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
+    parser.add_argument(
+        "--sampling",
+        choices=SAMPLINGS,
+        default=SAMPLINGS[0],
+        help="Latin hypercube or Sobol points cover the distribution more evenly (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--outputs", type=listed, metavar="NAMES", help=f"separated by commas (default: {','.join(OUTPUTS)})"
+    )
+    parser.add_argument(
+        "--statistics",
+        type=listed,
+        metavar="NAMES",
+        help=f"of each output: min, max, peak, time_of_peak, mean, rms, end (default: {','.join(STATISTICS)})",
+    )
+    parser.add_argument(
+        "--trajectories",
+        type=int,
+        metavar="N",
+        help="also write every Nth sample of the outputs into the directory trajectories",
+    )
     parser.add_argument(
         "--input",
         type=Path,
@@ -74,14 +117,34 @@ def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with a message of one line."""
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
-    begin = time.monotonic()
-    table = call(sweep, arguments, motion=motion)
-    seconds = time.monotonic() - begin
+    arguments.options = {"motion": "--input"}
+    if arguments.identified is not None:
+        if arguments.random:
+            raise UserError("replaces --random; choose one", argument="identified")
+        arguments.options["random"] = "--identified"
+    need("pyarrow")
+    if arguments.again is not None and arguments.out == DEFAULT_OUT / "sweep":
+        arguments.out = arguments.out.with_name("sweep-again")
+    earlier, begin = finished_runs(arguments.out), time.monotonic()
+    table = call(
+        sweep,
+        arguments,
+        motion=motion,
+        grid=arguments.grid or None,
+        random=arguments.identified or arguments.random or None,
+    )
+    seconds, count = time.monotonic() - begin, table.num_rows - earlier
+    if earlier:
+        print(f"kept        {earlier} finished runs in {arguments.out}")
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
-    pace = f"{seconds:.1f} s ({table.num_rows / seconds:.0f} per second)"
-    print(f"ran         {table.num_rows} runs on {where} in {pace}")
+    print(f"ran         {count} runs on {where} in {seconds:.1f} s ({count / seconds:.0f} per second)")
     status = table.column("status").to_pylist()
     if failed := status.count("failed"):
         first = status.index("failed")
         print(f"failed      {failed} runs; run {first}: {table.column('message')[first]}")
-    print(f"wrote       {arguments.out / 'runs.parquet'}")
+    if arguments.again is not None:
+        unlike = repeated(arguments.again, table)
+        verdict = f"other values in {', '.join(unlike)}" if unlike else "all values are equal"
+        print(f"repeated    {arguments.again}: {verdict}")
+    more = f", {arguments.out / TRAJECTORIES}" if (arguments.out / TRAJECTORIES).is_dir() else ""
+    print(f"wrote       {arguments.out / TABLE}{more}")

@@ -1,0 +1,211 @@
+"""The parameters of each run of a sweep: from a table, from a grid, or drawn at random."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+from collections.abc import Mapping
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from prw.arguments import (
+    Table,
+    check_names,
+    columns_of,
+    counted,
+    in_own_unit,
+    is_path,
+    is_table,
+    numbers_of,
+    spread_of,
+)
+from prw.errors import UserError
+from prw.files import read_text
+from prw.motion import Array
+from prw.testbed import Testbed
+
+if TYPE_CHECKING:
+    from prw.identification.results import Identification
+
+MAX_RUNS = 10_000_000
+#: How points are drawn: independently, or more evenly by `scipy.stats.qmc`.
+SAMPLINGS = ("random", "latin", "sobol")
+#: The distribution of a parameter, see `prw.sweep`.
+Spread = float | tuple[float, float] | tuple[str, float, float]
+#: Distributions by parameter, or an identification (or its report.json) with the joint distribution of its estimates.
+Random: TypeAlias = "Mapping[str, Spread] | Identification | str | os.PathLike[str]"
+
+
+class Joint(NamedTuple):
+    """The lognormal distribution of the parameters that an identification has estimated.
+
+    Attributes
+    ----------
+    medians
+        Estimates in SI, by name.
+    relative
+        (p,), their relative standard errors.
+    correlation
+        (p, p), their correlation.
+    others
+        The parameters that were not estimated, in SI.
+    """
+
+    medians: dict[str, float]
+    relative: Array
+    correlation: Array
+    others: dict[str, float]
+
+
+def joint_of(random: Identification | str | os.PathLike[str]) -> Joint:
+    """The distribution of the estimates of an identification, or of its file report.json. Raises UserError if it cannot be read,
+    or if the parameters were not identified."""
+    try:
+        content = json.loads(read_text(Path(random)) if is_path(random) else random.to_json())  # type: ignore[arg-type, union-attr]
+        names, correlation = content["correlation"]["names"], np.array(content["correlation"]["matrix"])
+        entries, identified = content["parameters"], content["identified"]
+        estimated = [name for name in names if name in entries]  # Distortions are not parameters of the FMU.
+        relative = np.array([entries[name]["relative_standard_error"] for name in estimated])
+        values = {name: float(entry["value"]) for name, entry in entries.items()}
+    except OSError as error:
+        raise UserError(f"{random} cannot be read ({error.strerror or error})", argument="random") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise UserError(
+            f"{random!r} is neither a dict of distributions, nor an identification or its report.json",
+            argument="random",
+        ) from None
+    if not identified:
+        raise UserError(
+            "the data did not determine the parameters, or the FMU does not explain the data; give the distributions yourself, as in "
+            '{"k1": 0.1}',
+            argument="random",
+        )
+    chosen = [names.index(name) for name in estimated]
+    others = {name: value for name, value in values.items() if name not in estimated}
+    return Joint({name: values[name] for name in estimated}, relative, correlation[np.ix_(chosen, chosen)], others)
+
+
+def tabulated(table: Table | str | os.PathLike[str], testbed: Testbed, fixed: Mapping[str, Any]) -> dict[str, Array]:
+    """The columns of a table, (runs,) by parameter. Raises UserError if it cannot be read or has other columns than parameters."""
+    where = "table"
+    if is_path(table):
+        import pyarrow as pa
+        from pyarrow import csv, parquet
+
+        path = Path(table)  # type: ignore[arg-type]
+        where = str(path)
+        try:
+            read = parquet.read_table(path) if path.suffix == ".parquet" else csv.read_csv(path)
+        except (OSError, pa.ArrowException) as error:
+            raise UserError(f"{where} cannot be read ({error})", argument="table") from None
+        columns = {name: read[name].to_numpy() for name in read.column_names}
+    elif is_table(table):
+        columns = columns_of(table)
+    else:
+        raise UserError(f"{table!r} is neither a table nor the path of a CSV or Parquet file", argument="table")
+    check_names("table", columns, testbed.starts)
+    if both := [name for name in columns if name in fixed]:
+        raise UserError(f"{both[0]} is also in parameters; choose one", argument="table")
+    values = {name: numbers_of(f"{where}: {name}", column) for name, column in columns.items()}
+    lengths = {len(column) for column in values.values()}
+    if len(lengths) != 1 or not 0 < min(lengths) <= MAX_RUNS:
+        raise UserError(f"needs 1 to {MAX_RUNS} rows and equally long columns", argument="table")
+    for name, column in values.items():
+        if not np.isfinite(column).all():
+            raise UserError(f"{name} has values that are not finite numbers", argument="table")
+    return values
+
+
+def layout(
+    grid: Mapping[str, ArrayLike],
+    random: Mapping[str, Spread] | Joint,
+    runs: int,
+    seed: int,
+    sampling: str,
+    testbed: Testbed,
+    fixed: Mapping[str, Any],
+) -> dict[str, Array]:
+    """The values of each parameter that varies, one value per run: all combinations of the grid, each with its own draws. If
+    only a relative standard deviation is given, the median is the value in `fixed` or the FMU's start value. Raises UserError for
+    invalid arguments."""
+    drawn = random.medians if isinstance(random, Joint) else random
+    starts = {**testbed.starts, **fixed}
+    check_names("grid", grid, testbed.starts)
+    check_names("random", drawn, testbed.starts)
+    for name in (*grid, *drawn):
+        if (name in grid) + (name in drawn) + (name in fixed and name in grid) > 1:
+            raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
+    if not grid and not drawn:
+        raise UserError("nothing varies; give values of a parameter (grid), its distribution (random) or a table")
+    draws = counted("runs", runs) if drawn else 1
+    axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
+    total = math.prod(map(len, axes.values())) * draws
+    if total > MAX_RUNS:
+        raise UserError(f"{total} runs are more than the limit of {MAX_RUNS}; give fewer values (grid) or draws (runs)")
+    combinations = np.array(list(itertools.product(*axes.values())), dtype=np.float64).reshape(
+        total // draws, len(axes)
+    )
+    table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
+    scores = _scores(sampling, len(drawn), draws, total // draws, seed)
+    if isinstance(random, Joint):
+        values, vectors = np.linalg.eigh(random.correlation)
+        correlated = scores @ (vectors * np.sqrt(np.maximum(values, 0))).T
+        return table | {
+            name: median * np.exp(random.relative[k] * correlated[:, k])
+            for k, (name, median) in enumerate(random.medians.items())
+        }
+    return table | {name: _drawn(name, spread, starts[name], z) for (name, spread), z in zip(random.items(), scores.T)}
+
+
+def _scores(sampling: str, parameters: int, draws: int, combinations: int, seed: int) -> Array:
+    """Draws (combinations * draws, parameters) from the standard normal distribution. Raises UserError for an unknown method."""
+    if sampling not in SAMPLINGS:
+        raise UserError(f"{sampling!r} is not known; there are {', '.join(SAMPLINGS)}", argument="sampling")
+    if sampling == "random" or not parameters:
+        return np.random.default_rng(seed).standard_normal((parameters, combinations * draws)).T
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    if sampling == "sobol" and draws.bit_count() != 1:
+        least = 1 << draws.bit_length()
+        raise UserError(f"must be a power of 2 with sobol, such as {least}", argument="runs", given=draws)
+    engine = (qmc.Sobol if sampling == "sobol" else qmc.LatinHypercube)(parameters, rng=np.random.default_rng(seed))
+    shares = np.vstack([engine.random(draws) for _ in range(combinations)])
+    return np.asarray(ndtri(np.clip(shares, 2.0**-60, 1 - 2.0**-53)))
+
+
+def _drawn(name: str, spread: Spread, start: float, scores: Array) -> Array:
+    """Convert standard normal draws (count,) to another distribution, see `sweep`. Raises UserError for an invalid one."""
+    kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
+    if kind == "lognormal":
+        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
+        return median * np.exp(relative * scores)
+    finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
+    one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
+    if kind == "uniform" and one < other:
+        from scipy.special import ndtr
+
+        return np.asarray(one + (other - one) * ndtr(scores))
+    if kind == "normal" and other > 0:
+        return one + other * scores
+    raise UserError(
+        f'{name} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)',
+        argument="random",
+    )
+
+
+def _column(name: str, values: Any) -> Array:
+    try:
+        column = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        column = np.empty(0)
+    # The range is not checked here: if the FMU rejects a value, only the runs with this value fail.
+    if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
+        raise UserError(f"{name} must have one or more finite numbers as values, not {values!r}")
+    return column
