@@ -341,7 +341,9 @@ impl Instances {
         Ok(States { instances: Arc::clone(&self.instances), states: Some(Arc::new(read)) })
     }
 
-    /// Compute directional derivatives of unknowns for a seed, which has a value for each known.
+    /// Compute directional derivatives of unknowns for a seed, which has a value for each known. They are derivatives at this instant,
+    /// at which the states are given. `Fmu.sensitivities` returns derivatives of trajectories, in which the states depend on the
+    /// parameters, too.
     ///
     /// Parameters
     /// ----------
