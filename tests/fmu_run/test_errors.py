@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time as clock
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -421,3 +422,22 @@ def test_arguments_of_wrong_types_are_named(fmu, testbed):
             assert any(str(name) in str(raised.value) for name in named), (argument, value, raised.value)
             assert "\n" not in str(raised.value)
     assert one.errors == continuous.errors == {}, "an invalid argument must not make an instance fail"
+
+
+@pytest.mark.parametrize("flag", [True, 1, [0, 1], "true", np.array([True])])
+def test_an_input_without_effect_is_a_warning_once(testbed, flag):
+    given = {"outputs": ["roll"], "inputs": {"theta1": 0.1, "omega1": 0.2}}
+    time = [0.0, 0.1]
+    with fmu_run.Fmu(testbed) as fmu, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fmu.run(time, **given, start={"use_omega": flag})
+        fmu.run(time, **given, interface="model-exchange")
+        message = "omega1 has no effect, because use_omega is false; add 'use_omega': True to start"
+        with pytest.raises(UserWarning, match=message):
+            fmu.run(time, **given, start={"use_omega": False})
+        fmu.run(time, **given)
+    with (
+        fmu_run.System({"wrist": testbed}, {}) as system,
+        pytest.warns(UserWarning, match="wrist.omega1 .*wrist.use_omega"),
+    ):
+        system.run(time, outputs=["wrist.roll"], inputs={"wrist.omega1": 1.0})

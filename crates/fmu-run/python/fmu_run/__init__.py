@@ -22,6 +22,7 @@ from fmu_run.arguments import Log, Measure, Start
 from fmu_run.fmu import Fmu
 from fmu_run.model import Variable
 from fmu_run.runs import Event, Interrupted, Runs
+from fmu_run.sensitivities import Sensitivities
 from fmu_run.system import System
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Log",
     "Measure",
     "Runs",
+    "Sensitivities",
     "Start",
     "States",
     "System",

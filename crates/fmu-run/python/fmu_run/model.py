@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -13,8 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from fmu_run._native import Instances, Loaded, numbers
 from fmu_run.arguments import Interface, Log, Measure, Solver, Start, Trajectory
 from fmu_run.runs import Interrupted, Runs
+from fmu_run.sensitivities import LARGEST, Sensitivities, differentiate
 
 _Array = NDArray[np.float64]
+#: In the description of an input: the interface type in which it has an effect only while a Boolean variable is true, and that variable.
+_CONDITION = re.compile(r"used (?:in (Co-Simulation|Model Exchange) )?only if (\w+) is true")
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,8 @@ class Model:
         #: dict[str, Variable]: the variables by name, in the order of the model description. As in FMI 2.0, each element of an array of
         #: FMI 3.0 is a variable: T[3]. Clocks are omitted.
         self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
+        #: Inputs about which `run` has warned.
+        self._warned = set[str]()
 
     def __enter__(self) -> Self:
         return self
@@ -182,6 +189,12 @@ class Model:
         Interrupted
             After Ctrl-C: a KeyboardInterrupt whose attribute `runs` contains the finished runs.
 
+        Warns
+        -----
+        UserWarning
+            Once for each input that has no effect, because its description is like "used only if use_omega is true", and that variable is
+            false in all runs.
+
         Examples
         --------
         >>> runs = fmu.run(np.arange(0, 1, 1e-3), outputs=["y"], start={"k": [1.0, 2.0]})
@@ -206,12 +219,98 @@ class Model:
             (rtol, atol, max_step),
             events,
         )
+        self._warn_of_unused(inputs or {}, start or {}, interface or "co-simulation")
         runs, raised = Runs(*found[:-1]), found[-1]
         if isinstance(raised, KeyboardInterrupt):
             raise Interrupted(runs) from None
         if raised is not None:
             raise raised
         return runs
+
+    def _warn_of_unused(self, inputs: Mapping[str, Any], start: Mapping[str, Any], interface: Interface) -> None:
+        for name in inputs:
+            variable = self.variables.get(name)
+            if variable is None or name in self._warned or not (found := _CONDITION.search(variable.description)):
+                continue
+            # In a system, names begin with the name of the component.
+            condition = name[: -len(name.rpartition(".")[2])] + found[2]
+            if condition not in self.variables or (found[1] or interface)[0].lower() != interface[0]:
+                continue
+            value = start.get(condition, self.variables[condition].start or "false")
+            if not np.isin(np.asarray(value).astype(str), ("true", "True", "1", "1.0")).any():
+                self._warned.add(name)
+                why = f"{name} has no effect, because {condition} is false; add {condition!r}: True to start"
+                warnings.warn(why, UserWarning, stacklevel=3)
+
+    def sensitivities(
+        self,
+        time: ArrayLike,
+        *,
+        outputs: Sequence[str],
+        parameters: str | Sequence[str],
+        start: Mapping[str, Start] | None = None,
+        steps: Mapping[str, float] = {},
+        **others: Any,
+    ) -> Sensitivities:
+        """Differentiate trajectories with respect to parameters, by central differences in one batch of 12 runs for each parameter.
+
+        `Instances.directional_derivative` is the derivative at one instant, at which the states do not depend on the parameters. Here they
+        do, because all values at and before this instant depend on them.
+
+        Parameters
+        ----------
+        time, outputs
+            As in `run`; outputs must be numeric.
+        parameters
+            Names of parameters, or of other variables with a floating-point start value.
+        start
+            Start values as in `run`, but the same for all runs. The derivatives are at these values.
+        steps
+            The largest step of a parameter by name, in the unit of the FMU. Default: an eighth of its value. Five smaller steps are tried,
+            the smallest of which is 1/1024 of the largest.
+        others
+            Further arguments of `run`, such as `inputs`, `every` and `threads`.
+
+        Returns
+        -------
+        Sensitivities
+            The derivatives and their estimated errors. If the FMU has a solver, its tolerance determines how large the errors are.
+
+        Raises
+        ------
+        ValueError
+            For invalid arguments, such as a parameter that is 0 and has no step, or if the FMU rejects the steps of a parameter.
+        FmuError
+            As in `run`.
+
+        Examples
+        --------
+        >>> found = fmu.sensitivities(time, outputs=["y"], parameters=["k"])
+        >>> found["y", "k"], found.errors["y", "k"]
+        """
+        names = [parameters] if isinstance(parameters, str) else list(dict.fromkeys(parameters))
+        given, values = dict(start or {}), {}
+        for name in names:
+            if name not in self.variables:
+                raise ValueError(f"parameters: the FMU has no variable {name!r}")
+            value = given.pop(name, self.variables[name].start or "0")
+            if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str):
+                value = self.converted(name, *value)
+            array = numbers(name, float(value) if isinstance(value, str) else value)
+            if array.ndim != 0:
+                raise ValueError(f"start: {name} has the shape {array.shape}; sensitivities need one value")
+            values[name] = float(array)
+            if not np.isfinite(found := steps.get(name, LARGEST * abs(values[name]))) or not found > 0:
+                raise ValueError(f"{name} is {values[name]:g}; give its largest step, as in steps={{{name!r}: 0.1}}")
+        if not names:
+            raise ValueError("parameters: name at least one")
+        largest = {name: steps.get(name, LARGEST * abs(value)) for name, value in values.items()}
+        return differentiate(
+            lambda varied: self.run(time, outputs=outputs, start={**given, **varied}, **others),
+            outputs,
+            values,
+            largest,
+        )
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
         """Convert values to the unit of a variable.

@@ -11,6 +11,7 @@ These functions are public; the modules of this package are internal::
     simulate, read, animate, sweep     runs and recordings
     identify, excite                   parameters from measurements, and motions to measure with
     linearize, Linearizer              linear models
+    sensitivities                      derivatives of a simulation with respect to parameters
     check                              another tool's results against a reference
     default_fmu                        the path of the FMU
 

@@ -13,6 +13,7 @@ from .linearization import linearize as linearize
 from .motion import Motion as Motion
 from .recording import Recording as Recording
 from .recording import read as read
+from .sensitivity import sensitivities as sensitivities
 from .simulation import Run as Run
 from .simulation import simulate as simulate
 from .state_space import StateSpace as StateSpace
