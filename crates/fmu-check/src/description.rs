@@ -19,8 +19,8 @@ pub struct Description {
     pub step_size: Option<f64>,
     /// Rules that the model description breaks.
     pub wrong: Vec<Observation>,
-    /// Value references of the variables that may be read in Initialization Mode of FMI 2.0.
-    early: HashSet<u32>,
+    /// Types and value references of the variables that may be read in Initialization Mode of FMI 2.0.
+    early: HashSet<Handle>,
 }
 
 /// Gives access to the fields of the model description.
@@ -72,8 +72,12 @@ impl Description {
     /// Returns the broken rules that `ModelDescription::parse` does not report.
     fn evaluate(&self) -> Vec<Observation> {
         let mut wrong = Vec::new();
-        if self.token.is_empty() {
-            wrong.push(("description.token", "guid or instantiationToken is missing or empty".to_owned()));
+        let token = if self.standard == Standard::Fmi2 { "guid" } else { "instantiationToken" };
+        let is_missing = |(fault, why): &(Fault, String)| *fault == Fault::Attribute && why.ends_with(token);
+        if self.faults.iter().any(is_missing) {
+            wrong.push(("description.token", format!("{token} is missing")));
+        } else if self.token.is_empty() {
+            wrong.push(("description.empty-token", format!("{token} is empty")));
         }
         if self.co_simulation.is_none() && self.model_exchange.is_none() && !self.scheduled_execution {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
@@ -141,15 +145,13 @@ impl Description {
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
-    /// Returns the variables with the C type and value reference of this variable, including the variable itself.
+    /// Returns the variables with the type and value reference of this variable, including the variable itself.
     pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
         let variable = &self.variables[index];
-        let (reference, kind) = (variable.reference, variable.base.map(|base| kind_of(self.standard, base)));
-        self.variables.iter().enumerate().filter_map(move |(index, other)| {
-            let same =
-                other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
-            same.then_some(index)
-        })
+        let handle = handle(self.standard, variable);
+        let all = self.variables.iter().enumerate();
+        all.filter(move |(_, other)| crate::description::handle(self.standard, other) == handle)
+            .map(|(index, _)| index)
     }
 
     /// Returns the C type of the values of a variable.
@@ -161,7 +163,7 @@ impl Description {
     /// derivatives (note 2 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0.5) and the initial unknowns; FMI 3.0 allows all
     /// variables.
     pub fn is_readable_while_initializing(&self, index: usize) -> bool {
-        self.standard == Standard::Fmi3 || self.early.contains(&self.variables[index].reference)
+        self.standard == Standard::Fmi3 || self.early.contains(&handle(self.standard, &self.variables[index]))
     }
 
     /// Returns the relative difference up to which results of a solver with variable steps are regarded as equal: the tolerance
@@ -181,15 +183,22 @@ impl Description {
     }
 }
 
-/// Returns the value references of outputs, continuous states, their derivatives and initial unknowns.
-fn early(written: &ModelDescription) -> HashSet<u32> {
+/// Type in the names of getters and setters, and value reference. In FMI 2.0, variables of different types may have the same reference.
+type Handle = (Option<&'static str>, u32);
+
+fn handle(standard: Standard, variable: &Variable) -> Handle {
+    (variable.base.map(|base| type_name(standard, base)), variable.reference)
+}
+
+/// Returns the types and value references of outputs, continuous states, their derivatives and initial unknowns.
+fn early(written: &ModelDescription) -> HashSet<Handle> {
     let unknowns = written.derivatives.iter().chain(&written.outputs).chain(&written.initial_unknowns);
     let listed = unknowns.map(|unknown| unknown.variable);
     let states = written.derivatives.iter().filter_map(|of| written.variables[of.variable].derivative_of);
     let outputs =
         (0..written.variables.len()).filter(|index| written.variables[*index].causality == "output");
     let all = listed.chain(states).chain(outputs);
-    all.map(|index| written.variables[index].reference).collect()
+    all.map(|index| handle(written.standard, &written.variables[index])).collect()
 }
 
 /// Causality, variabilities and values of `initial` that may be combined: the tables of section 2.2.7 of FMI 2.0.5 and section
@@ -247,11 +256,17 @@ fn faults(variable: &Variable) -> Vec<Observation> {
         let why = format!("the start value of {name}, {number}, is outside its min and max");
         add("description.range", why);
     }
-    let texts = [BaseType::String, BaseType::Binary, BaseType::Boolean];
-    let number =
-        |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
-    if variable.base.is_some_and(|base| !texts.contains(&base)) && !variable.start.iter().all(number) {
-        let why = format!("the start value of {name}, {:?}, is not a number", variable.start.join(" "));
+    let is_value: fn(&String) -> bool = match variable.base {
+        Some(BaseType::String | BaseType::Binary) | None => |_| true,
+        Some(BaseType::Boolean) => |text| ["true", "false", "1", "0"].contains(&text.as_str()),
+        Some(base) if base.is_float() => {
+            |text| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str())
+        }
+        Some(_) => |text| text.parse::<i128>().is_ok(),
+    };
+    if !variable.start.iter().all(is_value) {
+        let what = variable.base.map_or("value".to_owned(), |base| base.to_string());
+        let why = format!("the start value of {name}, {:?}, is not a {what}", variable.start.join(" "));
         add("description.start", why);
     }
     wrong
@@ -281,5 +296,34 @@ pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
         "String" | "Binary" => Kind::Pointer,
         "Boolean" if standard == Standard::Fmi3 => Kind::U8,
         _ => Kind::I32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Description;
+
+    /// Variables of different types may have the same value reference in FMI 2.0 (section 2.2.7), so they are no aliases, and each may be
+    /// read in other modes.
+    #[test]
+    fn references_belong_to_a_type() {
+        let variables: String = [("a", "output", "Real"), ("b", "local", "Integer"), ("c", "local", "Boolean")]
+            .map(|(name, causality, of)| {
+                let variability = if of == "Real" { "continuous" } else { "discrete" };
+                format!(
+                    "<ScalarVariable name='{name}' valueReference='1' causality='{causality}' variability='{variability}'>\
+                     <{of}/></ScalarVariable>"
+                )
+            })
+            .concat();
+        let text = format!(
+            "<fmiModelDescription fmiVersion='2.0' guid='g' modelName='m'><CoSimulation modelIdentifier='m'/>\
+             <ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
+        );
+        let description = Description::parse(&text).expect("a model description");
+        for index in 0..3 {
+            assert_eq!(description.aliases(index).collect::<Vec<_>>(), [index]);
+            assert_eq!(description.is_readable_while_initializing(index), index == 0);
+        }
     }
 }

@@ -58,22 +58,57 @@ pub struct Expected {
     /// String that the function for the version or the platform returned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<Vec<u8>>,
+    /// Whether the call has other results in each run, for example because the FMU returns memory that it has not initialized.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub varies: bool,
 }
 
 impl Expected {
-    /// Returns whether a call has these results.
-    fn fits(&self, outcome: &Outcome) -> bool {
-        self.status == outcome.status
+    /// Returns whether a call has these results. `other` is its outcome in another run, from which results that vary must differ.
+    fn fits(&self, outcome: &Outcome, other: Option<&Outcome>) -> bool {
+        let results = |outcome: &Outcome| (outcome.status, outcome.written.clone(), outcome.log.clone());
+        (self.status == outcome.status || self.varies && self.status.is_none())
             && self.missing == outcome.missing
             && self.written.as_ref().is_none_or(|written| *written == outcome.written)
             && self.log.as_ref().is_none_or(|log| *log == outcome.log)
             && (self.text.is_none() || self.text == outcome.text)
+            && (!self.varies || other.is_some_and(|other| results(other) != results(outcome)))
+    }
+
+    /// Removes the results that the call does not have in another run, which also shows the finding.
+    fn loosen(&mut self, other: &Outcome) {
+        let [status, written, log] = [
+            self.status != other.status,
+            self.written.as_ref().is_some_and(|written| *written != other.written),
+            self.log.as_ref().is_some_and(|log| *log != other.log),
+        ];
+        self.varies |= status || written || log;
+        self.status = self.status.take().filter(|_| !status);
+        self.written = self.written.take().filter(|_| !written);
+        self.log = self.log.take().filter(|_| !log);
     }
 }
 
 impl Evidence {
-    /// Returns whether a run of a call sequence shows the finding.
-    pub fn shows(&self, run: &Run, sequence: &CallSequence) -> bool {
+    /// Returns whether results vary from run to run, so that two runs are needed to show the finding.
+    pub fn varies(&self) -> bool {
+        matches!(self, Self::Same(expected, _) if expected.iter().any(|call| call.varies))
+    }
+
+    /// Removes the results that another run does not have, although it also shows the finding.
+    pub fn loosen(&mut self, other: &Run) {
+        if let Self::Same(expected, _) = self {
+            for call in expected {
+                if let Some(outcome) = other.outcome(call.id) {
+                    call.loosen(outcome);
+                }
+            }
+        }
+    }
+
+    /// Returns whether a run of a call sequence shows the finding. Results that vary must differ from those of `other`, a second
+    /// run in other processes.
+    pub fn shows(&self, run: &Run, other: Option<&Run>, sequence: &CallSequence) -> bool {
         let mut outcomes = run.outcomes.values();
         let of_pair = |[one, other]: &[u32; 2]| Some((run.outcome(*one)?, run.outcome(*other)?));
         match self {
@@ -91,10 +126,12 @@ impl Evidence {
                     || one.written.iter().zip(&other.written).any(|(one, other)| one.differ(other).is_some())
             }),
             Self::Same(expected, pairs) => {
-                expected.iter().all(|call| run.outcome(call.id).is_some_and(|outcome| call.fits(outcome)))
-                    && pairs
-                        .iter()
-                        .all(|pair| of_pair(pair).is_some_and(|(one, other)| one.written != other.written))
+                expected.iter().all(|call| {
+                    let other = other.and_then(|other| other.outcome(call.id));
+                    run.outcome(call.id).is_some_and(|outcome| call.fits(outcome, other))
+                }) && pairs
+                    .iter()
+                    .all(|pair| of_pair(pair).is_some_and(|(one, other)| one.written != other.written))
             }
             Self::Grown(measure, first, last) => {
                 let measured = |id: &u32| run.outcome(*id)?.measured.as_ref();

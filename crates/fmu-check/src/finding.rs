@@ -111,9 +111,9 @@ impl Finding {
         Self { sequence, criterion: Some(criterion), ..self }
     }
 
-    /// Records whether the calls show the finding again. A finding that they do not show is a note.
+    /// Records whether the calls show the finding again. A finding that was not shown again is a note, whatever the reason.
     pub fn judge(&mut self, proof: Proof) {
-        if matches!(proof, Proof::NotShown(_)) {
+        if matches!(proof, Proof::NotShown(_) | Proof::NotRun(_)) {
             self.severity = Severity::Note;
         }
         self.proof = proof;

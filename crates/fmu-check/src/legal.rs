@@ -175,7 +175,7 @@ impl State {
                 return here && real(1) > 0.0;
             }
             "SetTime" => {
-                let is_later = real(0) >= self.time - 1e-12;
+                let is_later = real(0) >= self.time || !is_other_time(real(0), self.time);
                 self.time = real(0);
                 return is_later;
             }

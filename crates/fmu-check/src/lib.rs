@@ -50,9 +50,10 @@ use options::INTERFACES;
 use run::Stop;
 use schedule::{execute_checks, prove, stop};
 use std::io::{IsTerminal as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::{Duration, Instant};
 use trajectory::{NoTrajectory, find_trajectory};
 
 /// Topics that are not part of a quick check.
@@ -136,27 +137,46 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 
 /// Checks an FMU. If `progress` is set, a line on the standard error shows the progress.
 ///
+/// Returns when the time is over, or when the user interrupts the check, even if a check is still evaluating results: its thread then
+/// ends with the process.
+///
 /// # Errors
 /// Fails if the file is not an FMU of FMI 2.0 or 3.0, if the baseline cannot be read, or if a report or a temporary file cannot
 /// be written.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
-    // The checker is dropped before the directory is removed, because its processes use the directory until they end.
-    let (_scratch, mut checker) = opened(path, options, begin)?;
+    let (scratch, mut checker) = opened(path, options, begin)?;
     simulate(&mut checker)?;
-    let session = Session { path, options, baseline, begin };
-    // The report is written after every check, so that earlier findings are not lost if this process is killed.
-    let write_report = || match &options.out {
-        Some(directory) => session.report(&checker, session.wanted_findings(&checker)).write(directory),
-        None => Ok(()),
-    };
-    execute_checks(&checker, progress, &|topic| is_wanted(options, topic), &write_report)?;
-    let mut findings = session.wanted_findings(&checker);
-    if !worker::interrupted() {
-        prove(&checker, &mut findings, options, progress);
+    let session = Arc::new(Session {
+        path: path.to_owned(),
+        options: options.clone(),
+        baseline,
+        begin,
+        checker,
+        findings: OnceLock::new(),
+    });
+    let work = std::thread::spawn({
+        let session = Arc::clone(&session);
+        move || session.work(progress)
+    });
+    while !work.is_finished() {
+        if session.is_over() {
+            session.checker.close();
+            // The processes of the FMU use the directory. The first of them removes it when this process ends.
+            std::mem::forget(scratch);
+            return Ok(session.final_report());
+        }
+        std::thread::sleep(Duration::from_millis(5));
     }
-    Ok(session.report(&checker, findings))
+    match work.join() {
+        Ok(result) => result?,
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+    let report = session.final_report();
+    // The checker is dropped before the directory is removed, because its processes use the directory until they end.
+    drop(session);
+    Ok(report)
 }
 
 /// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a
@@ -232,20 +252,70 @@ fn is_wanted(options: &Options, topic: &str) -> bool {
     }
 }
 
-/// Arguments of a check that its report needs.
-struct Session<'a> {
-    path: &'a Path,
-    options: &'a Options,
+/// Time after the end of a check or an interrupt in which the checks should have ended by themselves.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// A check, with everything that its report needs.
+struct Session {
+    path: PathBuf,
+    options: Options,
     baseline: baseline::Baseline,
     begin: Instant,
+    checker: Checker,
+    /// Findings whose calls are being repeated; empty before that.
+    findings: OnceLock<Vec<Mutex<Finding>>>,
 }
 
-impl Session<'_> {
+impl Session {
+    /// Executes the checks, and repeats the calls of their findings.
+    fn work(&self, progress: bool) -> anyhow::Result<()> {
+        let Self { options, checker, .. } = self;
+        // The report is written after every check, so that earlier findings are not lost if this process is killed.
+        let write_report = || match &options.out {
+            Some(directory) => self.report(self.wanted_findings()).write(directory),
+            None => Ok(()),
+        };
+        execute_checks(checker, progress, &|topic| is_wanted(options, topic), &write_report)?;
+        let findings =
+            self.findings.get_or_init(|| self.wanted_findings().into_iter().map(Mutex::new).collect());
+        prove(checker, findings, options, progress);
+        Ok(())
+    }
+
+    /// Returns whether the checks have not ended in time, or not soon after an interrupt.
+    fn is_over(&self) -> bool {
+        let now = Instant::now();
+        now > self.checker.end + GRACE || worker::interrupted_at().is_some_and(|at| now > at + GRACE)
+    }
+
+    /// Returns the report. A finding whose calls have not been repeated is a note in it.
+    fn final_report(&self) -> Report {
+        let findings = match self.findings.get() {
+            None => self.wanted_findings(),
+            // The finding whose calls are being repeated is taken as it was before.
+            Some(slots) => {
+                let all = self.wanted_findings().into_iter();
+                let of = |(slot, before): (&Mutex<Finding>, Finding)| {
+                    slot.try_lock().map_or(before, |finding| finding.clone())
+                };
+                slots.iter().zip(all).map(of).collect()
+            }
+        };
+        let judged = findings.into_iter().map(|mut finding| {
+            if finding.criterion.is_some() && finding.proof == Proof::Files {
+                let stop = if worker::interrupted() { Stop::Interrupted } else { Stop::TimeOver };
+                finding.judge(Proof::NotRun(stop.to_string()));
+            }
+            finding
+        });
+        self.report(judged.collect())
+    }
+
     /// Returns the findings so far that the options ask for, the most severe first.
-    fn wanted_findings(&self, checker: &Checker) -> Vec<Finding> {
-        let mut findings = checker.findings();
+    fn wanted_findings(&self) -> Vec<Finding> {
+        let mut findings = self.checker.findings();
         let is_wanted_finding = |finding: &Finding| {
-            is_wanted(self.options, finding.topic())
+            is_wanted(&self.options, finding.topic())
                 || ["arrays", "logs"].contains(&finding.topic())
                 || ALWAYS.contains(&finding.name.as_str())
         };
@@ -254,18 +324,18 @@ impl Session<'_> {
         findings
     }
 
-    fn report(&self, checker: &Checker, mut findings: Vec<Finding>) -> Report {
+    fn report(&self, mut findings: Vec<Finding>) -> Report {
         sort(&mut findings);
-        let mut report = Report::new(self.path, checker, findings);
+        let mut report = Report::new(&self.path, &self.checker, findings);
         report.seconds = self.begin.elapsed().as_secs_f64();
         let why = if self.options.only.is_empty() { "left out (--quick)" } else { "left out (--only)" };
-        let unwanted = rules::TOPICS.iter().filter(|topic| !is_wanted(self.options, topic));
+        let unwanted = rules::TOPICS.iter().filter(|topic| !is_wanted(&self.options, topic));
         report.unreached.extend(unwanted.map(|topic| Unchecked {
             name: (*topic).to_owned(),
             why: why.to_owned(),
             allowed: true,
         }));
-        report.evaluate(self.options, &self.baseline);
+        report.evaluate(&self.options, &self.baseline);
         report
     }
 }

@@ -96,7 +96,9 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
     let mut shown = 0;
     for time in 1..=options.times {
         let run = checker.workers.execute_as(manner, &setting, &sequence, limit)?;
-        let shows = evidence.shows(&run, &sequence);
+        let again = || checker.workers.execute_as(Manner::Again, &setting, &sequence, limit);
+        let other = if evidence.varies() { Some(again()?) } else { None };
+        let shows = evidence.shows(&run, other.as_ref(), &sequence);
         shown += usize::from(shows);
         if time == 1 {
             print(&format!("Calls of {}:", path.display()));

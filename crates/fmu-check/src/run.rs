@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 #[cfg(not(target_os = "linux"))]
 use std::process::Stdio;
+use std::sync::Arc;
 
 /// Starts the processes that execute call sequences.
 pub struct Workers {
@@ -260,7 +261,7 @@ fn add_outcomes(
     let mut last = None;
     for line in ended.outcomes.lines() {
         if let Ok(outcome) = serde_json::from_str::<Outcome>(line) {
-            run.outcomes.insert(outcome.id, outcome);
+            run.outcomes.insert(outcome.id, Arc::new(outcome));
         } else if let Ok(end) = serde_json::from_str::<Last>(line) {
             last = Some(end.bytes);
         } else if let Ok(why) = serde_json::from_str::<Unloadable>(line) {

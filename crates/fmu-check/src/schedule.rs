@@ -27,15 +27,23 @@ fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).min(8)
 }
 
-/// Calls `each` on several threads with every item and the number of items that have begun. If `progress` is set, the line that
-/// `each` returns is printed.
-fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
+/// Calls `each` on several threads with every item and the number of items that have begun, until the check is closed. If `progress`
+/// is set, the line that `each` returns is printed.
+fn in_parallel<T: Sync>(
+    checker: &Checker,
+    items: &[T],
+    progress: bool,
+    each: impl Fn(&T, usize) -> String + Sync,
+) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
         for _ in 0..threads() {
             scope.spawn(|| {
                 while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let line = each(item, done.fetch_add(1, Ordering::Relaxed) + 1);
+                    if checker.is_closed() {
+                        break;
+                    }
                     if progress {
                         eprint!("\r{line}");
                         let _ = std::io::stderr().flush();
@@ -44,7 +52,7 @@ fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) ->
             });
         }
     });
-    if progress {
+    if progress && !checker.is_closed() {
         eprint!("\r{:79}\r", "");
     }
 }
@@ -86,8 +94,8 @@ pub fn execute_checks(
         .filter(|(_, count)| count.load(Ordering::Relaxed) > 0)
         .collect();
     remaining.iter().for_each(|(topic, _)| checker.unchecked(topic, UNFINISHED.to_owned()));
-    let (failure, writing) = (Mutex::new(None), Mutex::new(()));
-    in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
+    let failure = Mutex::new(None);
+    in_parallel(checker, &jobs, progress, |(topic, check, trajectory), done| {
         let result = match execute_check(checker, *check, *trajectory) {
             Err(error) if error.is::<Stop>() || interrupted() => {
                 checker.stopped(topic, stop(&error));
@@ -99,11 +107,9 @@ pub fn execute_checks(
         if counts.map(|(_, count)| count.fetch_sub(1, Ordering::Relaxed)).any(|count| count == 1) {
             checker.finished(topic, UNFINISHED);
         }
-        let one_at_a_time = writing.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = result.and_then(|()| write_report()) {
+        if let Err(error) = result.and_then(|()| checker.unless_closed(write_report)) {
             *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
         }
-        drop(one_at_a_time);
         let remaining = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
         let (all, executed) = (jobs.len(), checker.executed());
         format!("{done} of {all} checks, {executed} call sequences run, {remaining} s remaining: {topic:20}")
@@ -111,16 +117,22 @@ pub fn execute_checks(
     failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
-/// Shortens the call sequences of all findings and repeats them. Each finding gets an equal share of the remaining time.
-pub fn prove(checker: &Checker, findings: &mut [Finding], options: &Options, progress: bool) {
-    let count = findings.len();
-    let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();
-    in_parallel(&slots, progress, |slot, number| {
-        let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        let rounds = (count + 1 - number).div_ceil(threads());
-        let share =
-            checker.end.saturating_duration_since(Instant::now()) / u32::try_from(rounds).unwrap_or(1);
-        checker.prove(&mut finding, !options.no_shrink, Instant::now() + share);
-        format!("the shortest calls for {count} findings: {:40}", finding.name)
-    });
+/// Repeats the call sequences of all findings, the most severe first, and then shortens those that show their finding again. Each
+/// finding gets an equal share of the remaining time. What is not reproduced is only a note, so the repetitions come first.
+pub fn prove(checker: &Checker, findings: &[Mutex<Finding>], options: &Options, progress: bool) {
+    let each = |doing: &str, work: fn(&Checker, &mut Finding, Instant)| {
+        let count = findings.len();
+        in_parallel(checker, findings, progress, |slot, number| {
+            let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
+            let rounds = (count + 1 - number).div_ceil(threads());
+            let share =
+                checker.end.saturating_duration_since(Instant::now()) / u32::try_from(rounds).unwrap_or(1);
+            work(checker, &mut finding, Instant::now() + share);
+            format!("{doing} {count} findings: {:40}", finding.name)
+        });
+    };
+    each("repeating the calls of", Checker::prove);
+    if !options.no_shrink {
+        each("the shortest calls for", Checker::shorten);
+    }
 }

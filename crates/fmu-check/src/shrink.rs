@@ -3,7 +3,7 @@
 use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
 use crate::description::Description;
 use crate::legal::first_illegal;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Returns the numbers of the steps, in groups. The steps of a group are only removed together, for example the calls of an
 /// event.
@@ -47,7 +47,7 @@ fn content(step: &Step) -> Option<String> {
 }
 
 /// Returns the sequence without the steps with these numbers, some of which may be steps of its threads.
-fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
+fn without(sequence: &[Numbered], ids: &HashSet<u32>) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
         if let Step::Parallel(sequences) = &mut numbered.step {
@@ -65,27 +65,30 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
         .into_iter()
         .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
         .collect();
-    let content_of = |id: &u32| contents.get(id).cloned();
-    let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
+    let (mut groups, mut known) = (Vec::<Vec<u32>>::new(), HashMap::<Vec<&String>, usize>::new());
     for unit in units {
-        let key: Vec<String> = unit.iter().filter_map(content_of).collect();
-        match groups.iter_mut().find(|(other, _)| !key.is_empty() && *other == key) {
-            Some((_, ids)) => ids.extend(unit),
-            None => groups.push((key, unit)),
+        let key: Vec<&String> = unit.iter().filter_map(|id| contents.get(id)).collect();
+        match known.get(&key).filter(|_| !key.is_empty()) {
+            Some(index) => groups[*index].extend(unit),
+            None => {
+                known.insert(key, groups.len());
+                groups.push(unit);
+            }
         }
     }
-    groups.into_iter().map(|(_, ids)| ids).collect()
+    groups
 }
 
 /// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
 /// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess` and
-/// `Elsewhere`. If `compared` is set, corresponding calls of compared simulations are removed together.
+/// `Elsewhere`. If `compared` is set, corresponding calls of compared simulations are removed together. The search ends when
+/// `reproduces` returns `None`.
 pub fn shrink(
     description: &Description,
     sequence: &CallSequence,
     pinned: &[&str],
     compared: bool,
-    mut reproduces: impl FnMut(&CallSequence) -> bool,
+    mut reproduces: impl FnMut(&CallSequence) -> Option<bool>,
 ) -> CallSequence {
     let legal = first_illegal(description, sequence).is_none();
     let mut best = sequence.clone();
@@ -95,28 +98,32 @@ pub fn shrink(
     });
     let all: Vec<Vec<u32>> = units(sequence).into_iter().chain(threads).collect();
     let mut units = if compared { together(sequence, all) } else { all };
-    let stays = |id: &u32| {
-        all_steps(sequence).into_iter().any(|numbered| match &numbered.step {
-            Step::Call { function, .. } => {
-                numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
-            }
-            Step::FreshProcess | Step::Elsewhere(_) => numbered.id == *id && !pinned.is_empty(),
-            _ => false,
-        })
+    let stays = |step: &Step| match step {
+        Step::Call { function, .. } => pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name)),
+        Step::FreshProcess | Step::Elsewhere(_) => !pinned.is_empty(),
+        _ => false,
     };
-    units.retain(|unit| !unit.iter().any(stays));
+    let all = all_steps(sequence).into_iter().filter(|numbered| stays(&numbered.step));
+    let staying: HashSet<u32> = all.map(|numbered| numbered.id).collect();
+    units.retain(|unit| !unit.iter().any(|id| staying.contains(id)));
     let mut size = units.len() / 2;
     while size > 0 {
         let mut end = units.len();
         let mut shorter = false;
         while end > 0 {
             let begin = end.saturating_sub(size);
-            let tried = without(&best, &units[begin..end].concat());
+            let tried = without(&best, &units[begin..end].iter().flatten().copied().collect());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && all_steps(&tried).len() < all_steps(&best).len() && reproduces(&tried) {
-                best = tried;
-                units.drain(begin..end);
-                shorter = true;
+            if keeps && all_steps(&tried).len() < all_steps(&best).len() {
+                match reproduces(&tried) {
+                    None => return best,
+                    Some(false) => {}
+                    Some(true) => {
+                        best = tried;
+                        units.drain(begin..end);
+                        shorter = true;
+                    }
+                }
             }
             end = begin;
         }
@@ -172,7 +179,7 @@ mod tests {
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
         let short =
-            shrink(&description, &writer.sequence, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
+            shrink(&description, &writer.sequence, &[], false, |tried| Some(count(tried, "fmi2DoStep") >= 2));
         let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
         let rest = ["fmi2ExitInitializationMode", "fmi2DoStep", "fmi2DoStep"];
         assert_eq!(names(&short), [calls, rest].concat());
@@ -184,7 +191,7 @@ mod tests {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
-        let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| true);
+        let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| Some(true));
         assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
     }
 
@@ -201,7 +208,7 @@ mod tests {
         let parallel = |sequence: &CallSequence| {
             matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
         };
-        let reproduces = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let reproduces = |tried: &CallSequence| Some(parallel(tried) && count(tried, "fmi2DoStep") >= 4);
         let short = shrink(&description, &writer.sequence, &[], true, reproduces);
         let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
             panic!("{short:?}")

@@ -68,7 +68,8 @@ fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
-    let times = ((range(description) / size - 4.0) / 8.0).round();
+    // A default experiment of less than 12 steps has no longer ones.
+    let times = ((range(description) / size - 4.0) / 8.0).round().max(1.0);
     let far = checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"]) && times > 1.0;
     for (reach, discrete) in [(times, true), (times, false), (1.0, true), (1.0, false)] {
         if reach > 1.0 && !far {

@@ -10,6 +10,11 @@ use fmi_abi::BaseType;
 pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
     let (starts, size) = (variable.starts(), variable.starts_count());
+    let is_text = matches!(variable.base?, BaseType::String | BaseType::Binary);
+    if !is_text && starts.len() != size {
+        // The start value cannot be read, which is a finding of the description.
+        return None;
+    }
     let kind = kind_of(description.standard, variable.base?);
     Some(match variable.base? {
         BaseType::Real | BaseType::Float32 => {

@@ -3,6 +3,7 @@
 use super::Kind;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Message that the FMU logged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,8 +155,8 @@ pub enum End {
 /// Result of a call sequence.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// Results by the number of the step.
-    pub outcomes: HashMap<u32, Outcome>,
+    /// Results by the number of the step. They are shared, because the search for evidence copies a run many times.
+    pub outcomes: HashMap<u32, Arc<Outcome>>,
     pub end: End,
     /// Number of the first step without a result, in which the process ended; `None` if all steps have results.
     pub at: Option<u32>,
@@ -167,7 +168,7 @@ pub struct Run {
 
 impl Run {
     pub fn outcome(&self, id: u32) -> Option<&Outcome> {
-        self.outcomes.get(&id)
+        self.outcomes.get(&id).map(Arc::as_ref)
     }
 
     pub fn status(&self, id: u32) -> Option<i32> {

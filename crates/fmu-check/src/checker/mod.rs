@@ -57,6 +57,9 @@ pub struct Checker {
     /// sequence was executed at the same time.
     hung: Mutex<HashSet<String>>,
     executed: Mutex<u64>,
+    /// Whether the report is final, because the time is over or the user has interrupted the check. Checks that are still running
+    /// then have no effect.
+    closed: Mutex<bool>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -90,7 +93,24 @@ impl Checker {
             exclusive: RwLock::default(),
             hung: Mutex::default(),
             executed: Mutex::default(),
+            closed: Mutex::default(),
         }
+    }
+
+    /// Makes the report final.
+    pub fn close(&self) {
+        *locked(&self.closed) = true;
+    }
+
+    /// Returns whether the report is final.
+    pub fn is_closed(&self) -> bool {
+        *locked(&self.closed)
+    }
+
+    /// Writes the report, one thread at a time, unless it is final.
+    pub fn unless_closed(&self, write: impl FnOnce() -> anyhow::Result<()>) -> anyhow::Result<()> {
+        let closed = locked(&self.closed);
+        if *closed { Ok(()) } else { write() }
     }
 
     pub fn writer<'a>(&'a self, trajectory: &'a Trajectory) -> Writer<'a> {

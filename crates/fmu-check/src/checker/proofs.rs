@@ -54,26 +54,26 @@ impl Checker {
         Setting { soft: self.setting.soft && !ends, now, ..self.setting.clone() }
     }
 
-    /// Shortens the call sequence of a finding, and repeats its calls. A finding that they do not show again becomes a note. Ends
-    /// at the instant `until`.
-    pub fn prove(&self, finding: &mut Finding, shortens: bool, until: Instant) {
-        if finding.criterion.is_none() {
+    /// Repeats the calls of a finding. A finding that they do not show again becomes a note. Ends at the instant `until`.
+    pub fn prove(&self, finding: &mut Finding, until: Instant) {
+        if finding.criterion.is_some() {
+            finding.steps = (finding.sequence.len(), finding.sequence.len());
+            let proof = self.proof(finding, until);
+            finding.judge(proof);
+        }
+    }
+
+    /// Shortens the call sequence of a proven finding, if the shorter one shows it, too. Ends at the instant `until`.
+    pub fn shorten(&self, finding: &mut Finding, until: Instant) {
+        if finding.proof != Proof::Shown {
             return;
         }
-        let begin = Instant::now();
-        let (sequence, observed) = (finding.sequence.clone(), finding.observed.clone());
-        finding.steps = (sequence.len(), sequence.len());
-        if shortens {
-            self.shorten(finding, begin + until.saturating_duration_since(begin) / 2);
+        let (begin, mut shorter) = (Instant::now(), finding.clone());
+        self.search_shorter(&mut shorter, begin + until.saturating_duration_since(begin) / 2);
+        if shorter.sequence.len() < finding.sequence.len() && self.proof(&mut shorter, until) == Proof::Shown
+        {
+            *finding = shorter;
         }
-        let mut proof = self.proof(finding, until);
-        // The finding may need a call that was removed, so the original call sequence is also tried.
-        if matches!(proof, Proof::NotShown(_)) && finding.sequence.len() < sequence.len() {
-            finding.steps.1 = sequence.len();
-            (finding.sequence, finding.observed) = (sequence, observed);
-            proof = self.proof(finding, until);
-        }
-        finding.judge(proof);
     }
 
     /// Repeats the calls of a finding twice, adds them to the finding, and returns whether both repetitions show it.
@@ -86,8 +86,8 @@ impl Checker {
         })
     }
 
-    /// The first repetition must violate the criterion. Its results are the evidence, which the second one must have, too,
-    /// because a later replay has only the evidence.
+    /// Both repetitions must break the rule again, by equal results or by others. The results that are equal are the evidence, which
+    /// is all that a later replay has.
     fn show_twice(&self, finding: &mut Finding, until: Instant) -> anyhow::Result<Proof> {
         let Some(criterion) = finding.criterion.clone() else { return Ok(Proof::Files) };
         let limit = self.reproducing_limit(finding);
@@ -95,16 +95,21 @@ impl Checker {
         // The calls are also reported if there is no time to repeat them.
         reproduce::write(finding, Evidence::Unknown, &setting, limit, &self.description);
         let first = self.repetition(finding, until, Manner::Usual, |run| criterion(run).is_some())?;
-        let evidence = first.as_ref().map_or(Evidence::Unknown, |run| reproduce::evidence(finding, run));
-        reproduce::write(finding, evidence.clone(), &setting, limit, &self.description);
-        if first.is_none() {
+        let Some(first) = first else {
             return Ok(Proof::NotShown("a repetition of its calls does not show it".to_owned()));
+        };
+        let second = self.repetition(finding, until, Manner::Again, |run| criterion(run).is_some())?;
+        let mut evidence = reproduce::evidence(finding, &first, until);
+        if let Some(second) = &second {
+            evidence.loosen(second);
         }
-        let second =
-            self.repetition(finding, until, Manner::Again, |run| evidence.shows(run, &finding.sequence))?;
-        Ok(match second {
-            Some(_) => Proof::Shown,
-            None => Proof::NotShown("a second repetition of its calls has other results".to_owned()),
+        let is_shown = second.is_some_and(|second| {
+            evidence == Evidence::Unknown || evidence.shows(&first, Some(&second), &finding.sequence)
+        });
+        reproduce::write(finding, evidence, &setting, limit, &self.description);
+        Ok(match is_shown {
+            true => Proof::Shown,
+            false => Proof::NotShown("a second repetition of its calls does not show it".to_owned()),
         })
     }
 
@@ -144,7 +149,7 @@ impl Checker {
     }
 
     /// Removes calls that the finding does not need, until the instant `until` or the maximum number of attempts.
-    fn shorten(&self, finding: &mut Finding, until: Instant) {
+    fn search_shorter(&self, finding: &mut Finding, until: Instant) {
         let Some(criterion) = finding.criterion.clone() else { return };
         let setting = self.reproducing_setting(finding);
         let hangs = finding.name.ends_with("hang");
@@ -172,7 +177,7 @@ impl Checker {
         };
         let mut short = shrink(&self.description, &finding.sequence, pinned, !removes_separately, |tried| {
             remaining -= 1;
-            remaining >= 0 && Instant::now() < until && !interrupted() && reproduces(tried)
+            (remaining >= 0 && Instant::now() < until && !interrupted()).then(|| reproduces(tried))
         });
         // If a repetition does not reproduce the finding, the finding does not occur in every run, so its sequence is not
         // shortened.

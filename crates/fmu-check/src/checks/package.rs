@@ -162,14 +162,14 @@ fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str,
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let Some(machine) = machine(&file) else { return };
-    let wanted = match platform {
-        "linux64" | "win64" | "darwin64" => &["x86_64", "aarch64"][..],
-        "linux32" | "win32" => &["x86", "aarch32"],
-        other => &[other.split('-').next().unwrap_or_default()],
-    };
     // A library for macOS may be universal, and a directory with a non-standard name may have libraries for any architecture.
-    let may_be_universal = platform.contains("darwin");
-    if !may_be_universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
+    let wanted = match (platform, platform.split_once('-')) {
+        ("linux64" | "win64", _) => &["x86_64", "aarch64"][..],
+        ("linux32" | "win32", _) => &["x86", "aarch32"],
+        (_, Some((architecture, "linux" | "windows"))) => &[architecture],
+        _ => &[machine],
+    };
+    if !wanted.contains(&machine) {
         add("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
     }
     if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {

@@ -27,7 +27,8 @@ const CAUSES: [(&str, &[&str]); 6] = [
     ("resources.settings", &["results.", "states.", "reset.", "logs.printed"]),
 ];
 
-/// Sets the cause of each finding that may follow from another one, and moves the finding after its cause.
+/// Sets the cause of each finding that may follow from another one, and moves the finding after its cause. A finding is at most as
+/// severe as its cause, because it says nothing that its cause does not explain.
 pub fn explain(findings: &mut Vec<Finding>) {
     let found: Vec<String> = findings.iter().map(|finding| finding.name.clone()).collect();
     for finding in findings.iter_mut() {
@@ -39,6 +40,13 @@ pub fn explain(findings: &mut Vec<Finding>) {
         let cause = CAUSES.iter().filter(|(cause, _)| found.iter().any(|other| other == cause));
         let cause = cause.take_while(|(cause, _)| cause != name).find(|(_, of)| of.iter().any(fits));
         finding.cause = cause.map(|(cause, _)| (*cause).to_owned());
+    }
+    // A cause may itself have a cause, which comes earlier in the list.
+    for (cause, _) in CAUSES {
+        if let Some(severity) = findings.iter().find(|finding| finding.name == cause).map(|of| of.severity) {
+            let of = findings.iter_mut().filter(|finding| finding.cause.as_deref() == Some(cause));
+            of.for_each(|finding| finding.severity = finding.severity.min(severity));
+        }
     }
     let (causes, consequences): (Vec<_>, Vec<_>) =
         std::mem::take(findings).into_iter().partition(|finding| finding.cause.is_none());
@@ -56,11 +64,14 @@ pub fn explain(findings: &mut Vec<Finding>) {
 #[cfg(test)]
 mod tests {
     use super::explain;
-    use crate::finding::Finding;
+    use crate::finding::{Finding, Severity};
 
     #[test]
     fn consequences_follow_their_cause() {
-        let named = |name: &str| Finding { name: name.to_owned(), ..Finding::default() };
+        let named = |name: &str| {
+            let severity = if name == "results.process" { Severity::Fragile } else { Severity::Violation };
+            Finding { name: name.to_owned(), severity, ..Finding::default() }
+        };
         let names =
             ["reset.incomplete", "logs.utf8", "results.process", "states.restore", "results.instances"];
         let mut findings: Vec<Finding> = names.map(named).into();
@@ -78,5 +89,7 @@ mod tests {
                 ("results.instances", cause),
             ]
         );
+        let violations = findings.iter().filter(|finding| finding.severity == Severity::Violation);
+        assert_eq!(violations.map(|finding| &finding.name[..]).collect::<Vec<_>>(), ["logs.utf8"]);
     }
 }

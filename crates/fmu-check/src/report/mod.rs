@@ -91,6 +91,7 @@ impl Report {
             FailOn::Note => Some(Severity::Note),
             FailOn::Never => None,
         };
+        causes::explain(&mut self.findings);
         self.unused = baseline.unused(&self.findings, &self.unreached);
         for finding in &mut self.findings {
             finding.accepted = baseline.reason(finding);
@@ -109,7 +110,6 @@ impl Report {
         };
         let passed = TOPICS.into_iter().filter(|topic| is_passed(topic));
         self.passed = passed.map(str::to_owned).collect();
-        causes::explain(&mut self.findings);
         let fails = self.findings.iter().any(|finding| finding.fails);
         let unchecked = self.unreached.iter().any(|unchecked| !unchecked.allowed);
         self.status = if fails { 1 } else { 2 * u8::from(unchecked) };
@@ -168,8 +168,9 @@ impl Report {
             let calls = match finding.steps {
                 (0, 0) => String::new(),
                 (_, steps) => match &finding.proof {
-                    Proof::NotShown(why) => format!("; not reproduced ({why}), so only a note"),
-                    Proof::NotRun(why) => format!("; {steps} calls, not reproduced ({why})"),
+                    Proof::NotShown(why) | Proof::NotRun(why) => {
+                        format!("; {steps} calls, not reproduced ({why}), so only a note")
+                    }
                     Proof::Files | Proof::Shown => format!("; {steps} calls reproduce it"),
                 },
             };

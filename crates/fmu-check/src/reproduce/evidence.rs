@@ -4,12 +4,15 @@ use crate::call_sequence::{End, Outcome, Run, Values};
 use crate::evidence::{Evidence, Expected, Measure, corresponding_reads, end_name};
 use crate::finding::{Finding, SharedCriterion};
 use crate::worker::changed_setting;
+use std::sync::Arc;
+use std::time::Instant;
 
 /// Maximum number of calls that are searched for pairs.
 const MOST_COMPARED: usize = 12;
 
-/// Returns the evidence of a finding from a run of its call sequence that violates its criterion.
-pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
+/// Returns the evidence of a finding from a run of its call sequence that violates its criterion; unknown if the search does not end
+/// before the instant `until`.
+pub fn evidence(finding: &Finding, run: &Run, until: Instant) -> Evidence {
     let Some(criterion) = &finding.criterion else { return Evidence::Unknown };
     if matches!(run.end, End::Flood(_)) {
         return Evidence::Orphans;
@@ -28,28 +31,33 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.output.clear()) {
         return Evidence::Printed;
     }
-    if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.damage.clear())) {
+    if without(&|run| run.outcomes.values_mut().for_each(|outcome| Arc::make_mut(outcome).damage.clear())) {
         return Evidence::Damage;
     }
-    if without(&|run| run.outcomes.values_mut().for_each(|outcome| outcome.strays.clear())) {
+    if without(&|run| run.outcomes.values_mut().for_each(|outcome| Arc::make_mut(outcome).strays.clear())) {
         return Evidence::Strays;
     }
     if !corresponding_reads(&finding.sequence).is_empty() {
         return Evidence::Threads;
     }
-    let needed = needed(criterion, run);
+    let Some(needed) = needed(criterion, run, until) else { return Evidence::Unknown };
     let measured = |outcome: &Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
-    if needed.outcomes.values().any(measured) {
+    if needed.outcomes.values().any(|outcome| measured(outcome)) {
         return grown(finding, &needed);
     }
     let mut calls: Vec<&Outcome> =
-        needed.outcomes.values().filter(|outcome| outcome.measured.is_none()).collect();
+        needed.outcomes.values().map(Arc::as_ref).filter(|outcome| outcome.measured.is_none()).collect();
     calls.sort_unstable_by_key(|outcome| outcome.id);
     if calls.is_empty() {
         return Evidence::Unknown;
     }
-    let mut expected: Vec<Expected> =
-        calls.into_iter().map(|outcome| expected_result(criterion, &needed, outcome)).collect();
+    let mut expected = Vec::new();
+    for outcome in calls {
+        if Instant::now() >= until {
+            return Evidence::Unknown;
+        }
+        expected.push(expected_result(criterion, &needed, outcome));
+    }
     let pairs = unequal(criterion, &needed, &expected);
     for call in expected.iter_mut().filter(|call| pairs.iter().any(|pair| pair.contains(&call.id))) {
         (call.written, call.log) = (None, None);
@@ -67,7 +75,8 @@ fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec
         .collect();
     let equalized = |from: &Outcome, to: &Outcome| {
         let mut changed = run.clone();
-        changed.outcomes.entry(to.id).and_modify(|outcome| outcome.written.clone_from(&from.written));
+        let written = |outcome: &mut Arc<Outcome>| Arc::make_mut(outcome).written.clone_from(&from.written);
+        changed.outcomes.entry(to.id).and_modify(written);
         criterion(&changed).is_none()
     };
     let mut pairs = Vec::new();
@@ -95,14 +104,17 @@ fn alike(one: &Outcome, other: &Outcome) -> bool {
     one.written != other.written && shape(one) == shape(other)
 }
 
-/// Returns the run without the outcomes that the criterion does not need.
-fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
+/// Returns the run without the outcomes that the criterion does not need; `None` if the search does not end before `until`.
+fn needed(criterion: &SharedCriterion, run: &Run, until: Instant) -> Option<Run> {
     let mut needed = run.clone();
     let mut ids: Vec<u32> = run.outcomes.keys().copied().collect();
     ids.sort_unstable();
     let mut size = ids.len().div_ceil(2);
     while size > 0 {
         for some in ids.chunks(size) {
+            if Instant::now() >= until {
+                return None;
+            }
             let mut tried = needed.clone();
             some.iter().for_each(|id| drop(tried.outcomes.remove(id)));
             if tried.outcomes.len() < needed.outcomes.len() && criterion(&tried).is_some() {
@@ -111,7 +123,7 @@ fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
         }
         size /= 2;
     }
-    needed
+    Some(needed)
 }
 
 /// Returns the expected results of a call: the parts of its outcome that the criterion needs. Values and messages are left out if
@@ -119,7 +131,7 @@ fn needed(criterion: &SharedCriterion, run: &Run) -> Run {
 fn expected_result(criterion: &SharedCriterion, run: &Run, outcome: &Outcome) -> Expected {
     let without = |change: &dyn Fn(&mut Outcome)| {
         let mut changed = run.clone();
-        changed.outcomes.entry(outcome.id).and_modify(change);
+        changed.outcomes.entry(outcome.id).and_modify(|outcome| change(Arc::make_mut(outcome)));
         criterion(&changed).is_none()
     };
     let written = without(&|outcome| outcome.written.clear());
@@ -131,13 +143,15 @@ fn expected_result(criterion: &SharedCriterion, run: &Run, outcome: &Outcome) ->
         written: written.then(|| outcome.written.clone()),
         log: log.then(|| outcome.log.clone()),
         text: outcome.text.clone(),
+        varies: false,
     }
 }
 
 /// Returns the comparison of the two measurements that the criterion needs.
 fn grown(finding: &Finding, needed: &Run) -> Evidence {
     let measured = |outcome: &&Outcome| outcome.measured.as_ref().is_some_and(|measured| measured.times == 0);
-    let mut measurements: Vec<&Outcome> = needed.outcomes.values().filter(measured).collect();
+    let mut measurements: Vec<&Outcome> =
+        needed.outcomes.values().map(Arc::as_ref).filter(measured).collect();
     measurements.sort_unstable_by_key(|outcome| outcome.id);
     let [first, last] = measurements[..] else { return Evidence::Unknown };
     let changed = first.measured.as_ref().zip(last.measured.as_ref());
@@ -155,10 +169,15 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
 
 #[cfg(test)]
 mod tests {
-    use super::{Evidence, Expected, evidence};
+    use super::{Evidence, Expected};
     use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Values};
     use crate::finding::{Finding, SharedCriterion};
     use std::sync::Arc;
+    use std::time::{Duration, Instant};
+
+    fn evidence(finding: &Finding, run: &Run) -> Evidence {
+        super::evidence(finding, run, Instant::now() + Duration::from_secs(60))
+    }
 
     fn finding(criterion: SharedCriterion) -> Finding {
         let call = |id: u32, function: &str| {
@@ -176,14 +195,14 @@ mod tests {
     fn run() -> Run {
         let outcome = |id: u32, status: i32, value: f64| {
             let written = vec![Values::Numbers(Kind::F64, vec![value.to_bits()])];
-            (id, Outcome { id, status: Some(status), written, ..Outcome::default() })
+            (id, Arc::new(Outcome { id, status: Some(status), written, ..Outcome::default() }))
         };
         let mut run = Run {
             outcomes: [outcome(1, 0, 1.0), outcome(2, 3, 0.0), outcome(3, 0, 2.0)].into(),
             ..Run::default()
         };
         let message = Message { status: 3, category: None, text: Some(b"no".to_vec()) };
-        run.outcomes.entry(2).and_modify(|outcome| outcome.log.push(message));
+        run.outcomes.entry(2).and_modify(|outcome| Arc::make_mut(outcome).log.push(message));
         run
     }
 
@@ -200,10 +219,32 @@ mod tests {
         let other = |of_second: u32| {
             let mut run = run();
             let written = run.outcome(of_second).map(|outcome| outcome.written.clone()).unwrap_or_default();
-            run.outcomes.entry(3).and_modify(|outcome| outcome.written = written);
+            run.outcomes.entry(3).and_modify(|outcome| Arc::make_mut(outcome).written = written);
             run
         };
-        assert!(found.shows(&other(2), &finding.sequence) && !found.shows(&other(1), &finding.sequence));
+        let shows = |run: &Run| found.shows(run, None, &finding.sequence);
+        assert!(shows(&other(2)) && !shows(&other(1)));
+    }
+
+    /// A fault that returns uninitialized memory is shown by other values in each run.
+    #[test]
+    fn results_that_vary_must_vary_again() {
+        let criterion: SharedCriterion =
+            Arc::new(|run| run.status(2).filter(|status| *status > 5).map(|_| "no status".to_owned()));
+        let finding = finding(criterion);
+        let with_status = |status: i32| {
+            let mut run = run();
+            run.outcomes.entry(2).and_modify(|outcome| Arc::make_mut(outcome).status = Some(status));
+            run
+        };
+        let mut found = evidence(&finding, &with_status(1_085_369_984));
+        assert!(!found.varies());
+        found.loosen(&with_status(2_066_704));
+        assert!(found.varies());
+        let shows = |one: i32, other: i32| {
+            found.shows(&with_status(one), Some(&with_status(other)), &finding.sequence)
+        };
+        assert!(shows(77, 78) && !shows(0, 0));
     }
 
     #[test]

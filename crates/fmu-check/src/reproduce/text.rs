@@ -324,5 +324,8 @@ fn expected(call: &Expected, makes: bool) -> String {
         None => "logs nothing".to_owned(),
         Some(last) => format!("logs {}", string(last.text.as_deref())),
     }));
+    if call.varies {
+        parts.push("has other results in another run".to_owned());
+    }
     format!("call {} {}", call.id, parts.join(", "))
 }

@@ -1,13 +1,21 @@
 //! Handles interrupts, and confines the processes of an FMU. On Linux, each call sequence runs in a separate session and cannot
 //! send signals to the processes of the checker, and its descendants are ended after it.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// Returns whether the user has interrupted the check.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// Returns the instant at which this function first noticed that the user has interrupted the check.
+pub fn interrupted_at() -> Option<Instant> {
+    static AT: OnceLock<Instant> = OnceLock::new();
+    interrupted().then(|| *AT.get_or_init(Instant::now))
 }
 
 /// Handles SIGINT, SIGTERM and SIGHUP: the first signal stops the check, which still writes its report; the same signal again

@@ -20,7 +20,7 @@ mod work;
 pub use contain::end_group;
 #[cfg(target_os = "linux")]
 pub use contain::readable;
-pub use contain::{interrupted, listen_for_interrupts};
+pub use contain::{interrupted, interrupted_at, listen_for_interrupts};
 pub use job::{EVALUATED, EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE};
 pub use measure::{changed_setting, tolerated_growth};
 pub use memory::FILL;

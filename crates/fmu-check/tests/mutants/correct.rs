@@ -42,6 +42,24 @@ fn unusual_behaviour_is_accepted() {
     clean(3, "unusual", &["states.digits"]);
 }
 
+/// Asserts that the steps that fmu-check makes are allowed, whatever the default experiment is: a step that is not longer than 0 fails
+/// an assertion of unoptimized builds.
+#[test]
+fn any_default_experiment_is_checked() {
+    let directory = TempDir::new().expect("a directory");
+    for (stop, size) in [("1", "0.3"), ("1", "1"), ("1", "3"), ("0.07", "0.01"), ("1e-9", "1")] {
+        let path = fmu(directory.path(), 2, &library(2, ""), |text| {
+            text.replace(
+                r#"stopTime="1" stepSize="0.01""#,
+                &format!(r#"stopTime="{stop}" stepSize="{size}""#),
+            )
+        });
+        let (found, report) = found(&path, "none", &["--only", "life_cycle,dynamics,results", "--quick"]);
+        let found: Vec<_> = found.iter().filter(|(name, _)| name != "results.interfaces").collect();
+        assert!(found.is_empty(), "{stop}, {size}: {found:?} {}", report["unreached"]);
+    }
+}
+
 /// Asserts that there is no finding if this machine lacks a library that the FMU needs, but that the interface types are reported
 /// as not checked.
 #[cfg(target_os = "linux")]

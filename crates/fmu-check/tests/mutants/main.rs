@@ -180,7 +180,7 @@ fn symbol_missing() {
 
 /// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
 #[rustfmt::skip]
-const DESCRIPTIONS: [(u32, &str, &str, &str); 13] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str); 17] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
     (3, "description.combination", r#""input" variability"#, r#""input" initial="calculated" variability"#),
     (3, "description.combination", r#""output" variability="discrete""#, r#""output" variability="continuous""#),
@@ -191,6 +191,10 @@ const DESCRIPTIONS: [(u32, &str, &str, &str); 13] = [
     (2, "description.units", r#"<Real start="2""#, r#"<Real unit="stone" start="2""#),
     (2, "description.structure", r#"<Unknown index="9" dependencies="4 5"/>"#, ""),
     (2, "description.start", r#"<Real start="2"/>"#, "<Real/>"),
+    (2, "description.start", r#"<Real start="2"/>"#, r#"<Real start="1,5"/>"#),
+    (2, "description.start", r#"<Boolean/>"#, r#"<Boolean start="True"/>"#),
+    (3, "description.token", r#" instantiationToken="wagon""#, ""),
+    (2, "description.empty-token", r#"guid="wagon""#, r#"guid="""#),
     (2, "description.range", r#"<Real start="2""#, r#"<Real min="3" start="2""#),
     (2, "description.types", r#"<Real start="2""#, r#"<Real declaredType="Weight" start="2""#),
     (2, "description.names", r#"name="spring""#, r#"name="mass""#),
