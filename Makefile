@@ -7,10 +7,10 @@ PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
 FUZZ_SECONDS ?= 600
-# Numbers of rigs that `make monte-carlo` simulates: without a fault, for each fault and size, and for each friction of the shafts.
+# Numbers of rigs that `make monte-carlo` simulates: without a fault, for each fault and size, and for each effect of real rigs.
 RIGS ?= 300
 FAULTY ?= 50
-FRICTION ?= 40
+REAL ?= 8
 FIGURE ?= docs/detection.svg
 
 VENV := .venv
@@ -103,7 +103,7 @@ help:
 	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             identify 300 simulated rigs and 1820 with faults or friction -> out/'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1630 with faults or effects of real rigs -> out/'
 	@echo 'make fuzz                    search for calls that break the FMU, and for files that break the readers, 10 minutes each'
 	@echo '                             (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -286,7 +286,7 @@ study: $(VENV)/study.stamp fmu
 monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --repetitions $(RIGS) --out out/monte_carlo.json $(ARGS)
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
-	$(PY) tests/analysis/monte_carlo.py $(FMU) --friction $(FRICTION) --out out/friction.json $(ARGS)
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --real $(REAL) --out out/real.json $(ARGS)
 
 # libFuzzer starts from the inputs in corpus.zip and from the malformed files of fmu-run's tests, and adds new ones to target/fuzz.
 fuzz: need-rust need-nightly

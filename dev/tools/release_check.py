@@ -30,7 +30,7 @@ PARTS = {
     "importers' validation": ("validation",),
     "benchmarks, small counts": ("bench", "BENCH_QUICK=1"),
     "instructions of uses": ("instructions",),
-    "identification, 10 rigs": ("monte-carlo", "RIGS=10", "FAULTY=1", "FRICTION=1", "FIGURE=out/detection.svg"),
+    "identification, 10 rigs": ("monte-carlo", "RIGS=10", "FAULTY=1", "REAL=1", "FIGURE=out/detection.svg"),
     "figures": ("figures",),
     "documentation": ("docs",),
     "experiments": ("experiments",),

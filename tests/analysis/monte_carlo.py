@@ -2,7 +2,7 @@
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 300] [--sensors all|torque]
         [--motion independent|equal|opposite|fig4|slow|moves] [--seed 0]
-        [--faulty N | --friction N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+        [--faulty N | --real N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. The exit status is 1 in three cases:
@@ -16,9 +16,13 @@ A low share only counts if chance is an improbable cause: with true shares of 95
 With --faulty, the rigs have faults, and their motions last 6 s. The exit status is 1 if, of the rigs with an interval that misses
 the true value by more than two of its widths, more than 1 % have the verdict "fits".
 
-With --friction, plant.py simulates the rigs for 8 s, with other equations and with friction in the input shafts, from none to gross.
-The exit status is 1 if less than 97 % of the rigs without friction have the verdict "fits". It is also 1 if, at any friction,
-less than 92 % of the 95 % intervals of rigs with this verdict contain the true value.
+With --real, plant.py simulates N rigs for each row of REAL, for 6 s, with other equations and with what reality adds: friction,
+backlash, changes over time and so on. `prw.identify` has to name each cause. The exit status is 1 in four cases:
+
+* More than 5 % of the rigs without any addition are rejected or doubted.
+* An accepted rig has an interval that misses the true value by more than its width.
+* Less than 92 % of the intervals of all accepted rigs contain the true value.
+* Less than 80 % of the causes are named.
 """
 
 from __future__ import annotations
@@ -30,8 +34,10 @@ import multiprocessing
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,9 +45,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
 
 import plant  # noqa: E402
 import rig  # noqa: E402
+from scipy.interpolate import CubicSpline  # noqa: E402
 from scipy.stats import binom  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
 
+import prw  # noqa: E402
 from prw.identification import task_of  # noqa: E402
 from prw.identification.experiment import prepare  # noqa: E402
 from prw.identification.fit import fit  # noqa: E402
@@ -85,8 +93,99 @@ def with_fault(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     return simulated._replace(outputs=outputs)
 
 
-#: Friction of each input shaft, N.m, that --friction simulates.
-FRICTIONS = (0.0, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02)
+class Row(NamedTuple):
+    """What reality adds to a rig.
+
+    Attributes
+    ----------
+    text
+        Description with the unit of the sizes.
+    sizes
+        From hardly detectable to gross; the rigs of a row have them in turn.
+    fields
+        Fields of plant.Case for a size.
+    recorded
+        Change of the recorded columns for a size and a random generator.
+    named
+        Part of an addition, a cause or a note that names it.
+    sampled
+        Change of the rig before its sensors measure, as `recorded`.
+    """
+
+    text: str
+    sizes: tuple[float, ...]
+    named: str
+    fields: Callable[[float], dict] = lambda size: {}
+    recorded: Callable[[dict, float, np.random.Generator], dict] = lambda columns, size, random: columns
+    sampled: Callable[[rig.Rig, float, np.random.Generator], rig.Rig] = lambda simulated, size, random: simulated
+
+
+def drifting(columns: dict, size: float, random: np.random.Generator) -> dict:
+    """Returns the columns with a drift of one sensor: a sum of a line and a slow wave, of `size` times its motion."""
+    name = str(random.choice([n for n in rig.ALL if n in columns]))
+    x = np.linspace(0, 1, len(columns["time"]))
+    drift = x * random.choice([-1, 1]) + 0.5 * np.sin(np.pi * x * random.uniform(0.5, 1.5))
+    return {**columns, name: columns[name] + size * np.ptp(columns[name]) * drift}
+
+
+def wrapped(columns: dict, size: float, random: np.random.Generator) -> dict:
+    """Returns the columns with angles that restart after a full turn."""
+    turn, zero = 2 * np.pi, np.pi + size
+    return {n: (y + zero) % turn - np.pi if n.startswith("theta") else y for n, y in columns.items()}
+
+
+def mixed(columns: dict, size: float, random: np.random.Generator) -> dict:
+    """Returns the columns with crosstalk between the torques."""
+    tau1, tau2 = columns["tau1"], columns["tau2"]
+    return {**columns, "tau1": tau1 + size * tau2, "tau2": tau2 + size * tau1}
+
+
+def unsteady(simulated: rig.Rig, size: float, random: np.random.Generator) -> rig.Rig:
+    """Returns the rig, sampled at times with errors of `size` s."""
+    time = simulated.time
+    when = np.clip(time + random.normal(0, size, len(time)), time[0], time[-1])
+    outputs = {name: CubicSpline(time, y)(when) for name, y in simulated.outputs.items()}
+    return simulated._replace(theta=CubicSpline(time, simulated.theta)(when), outputs=outputs)
+
+
+def off(size: float) -> dict:
+    """Inertias that differ from the drawing by `size`, J3 in the other direction."""
+    return {"inertia": (1 + size, 1 - size / 2, 1 + size)}
+
+
+REAL = {
+    "nothing": Row("nothing", (0.0,), ""),
+    "friction": Row(
+        "friction of the shafts, N.m", (0.003, 0.005, 0.01, 0.02), "friction in both", lambda s: {"friction": (s, s)}
+    ),
+    "output": Row(
+        "friction of the output, N.m", (0.01, 0.02, 0.04), "friction about", lambda s: {"output_friction": s}
+    ),
+    "backlash 1": Row(
+        "backlash of k1, rad", (0.0005, 0.001, 0.002, 0.004), "couplings k1", lambda s: {"play": (s, 0.0)}
+    ),
+    "backlash 2": Row(
+        "backlash of k2, rad", (0.001, 0.002, 0.004, 0.008), "couplings k2", lambda s: {"play": (0.0, s)}
+    ),
+    "cubic 1": Row(
+        "cubic stiffness of k1, 1/rad2",
+        (100, 200, 400),
+        "cubic stiffness of the couplings k1",
+        lambda s: {"cubic": (s, 0.0)},
+    ),
+    "cubic 2": Row(
+        "cubic stiffness of k2, 1/rad2",
+        (20, 40, 80),
+        "cubic stiffness of the couplings k2",
+        lambda s: {"cubic": (0.0, s)},
+    ),
+    "inertias": Row("wrong inertias, fraction", (0.05, -0.05, 0.03, 0.1), "inertias", off),
+    "softening": Row("k1 falls midway by, fraction", (0.02, 0.05, 0.1), "k1 changes", lambda s: {"softening": s}),
+    "drift": Row("drift of a sensor, fraction of its motion", (0.01, 0.02, 0.05), "drift", recorded=drifting),
+    "wrapped": Row("wrapped angles, beginning at, rad", (3.0, -2.9, 3.1), "restarts", recorded=wrapped),
+    "crosstalk": Row("crosstalk of the torques, fraction", (0.01, -0.01, 0.02), "crosstalk", recorded=mixed),
+    "jitter": Row("jitter of the times, s", (1e-4, 2e-4, 4e-4), "jitter", sampled=unsteady),
+}
 
 
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
@@ -95,9 +194,31 @@ def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: s
     return identified(fmu, with_fault(simulated, fault, size) if fault else simulated, seed, channels, counts)
 
 
-def braked(fmu: str, seed: int, motion: str, friction: float) -> tuple:
-    """Identifies a rig of `plant.experiment` with all sensors. friction: N.m."""
-    return identified(fmu, plant.experiment(seed, friction, motion), seed, rig.ALL, rig.COUNTS)
+class Outcome(NamedTuple):
+    """What `prw.identify` made of a rig: whether it accepted the data, doubted them in a note, and named the cause; whether each interval
+    contains the true value, and the largest distance of a true value from its interval, in widths; and the report in words."""
+
+    accepted: bool
+    doubted: bool
+    named: bool
+    inside: list[bool]
+    missed: float
+    words: list[str]
+
+
+def realistic(fmu: str, simulated: rig.Rig, seed: int, kind: str, size: float) -> Outcome:
+    """Identifies a rig of `plant.experiments` as a user would, with all sensors and what the row `kind` of REAL does to the record."""
+    row, random = REAL[kind], np.random.default_rng(seed + 2_000_000)
+    columns = row.recorded(rig.measure(row.sampled(simulated, size, random), seed + 1_000_000), size, random)
+    found = prw.identify(columns, starts=1, fmu=fmu)
+    low, high = np.log([found.parameters[name].interval for name in rig.NAMES]).T
+    true = np.log([simulated.parameters[name] for name in rig.NAMES])
+    words = [*found.additions, *found.diagnosis, *found.notes]
+    doubted = any("suggest" in note for note in found.notes)
+    missed = float((np.maximum(low - true, true - high) / (high - low)).max())
+    # A cause counts as named if it is among the first two.
+    named = any(row.named in each for each in [*found.additions, *found.diagnosis[:2], *found.notes])
+    return Outcome(found.fits, doubted, named, ((low < true) & (true < high)).tolist(), missed, words)
 
 
 def identified(fmu: str, simulated: rig.Rig, seed: int, channels, counts: int) -> tuple:
@@ -166,26 +287,52 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
     return {"commit": commit(), "rigs": rigs, "faults": rows, "missed_grossly": grossly, "unnoticed": missed}, good
 
 
-def friction(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """Returns verdicts and coverage by the friction of the input shafts. Also returns whether rigs without friction fit, and whether
-    the intervals of all rigs that fit have the stated coverage."""
-    rigs, motions = options.friction, tuple(plant.MOTIONS)
-    jobs = [(options.fmu, options.seed + i, motions[i % len(motions)], size) for size in FRICTIONS for i in range(rigs)]
-    results = iter(pool.map(braked, *zip(*jobs)))
-    print(f"{rigs} rigs for each friction of the input shafts, N.m: accepted; of these, intervals with the true value")
-    print(f"  {'':8}{'accepted':>10}" + "".join(f"{name:>6}" for name in rig.NAMES) + f"{'all':>8}")
-    rows, good = [], True
-    for size in FRICTIONS:
-        found = list(itertools.islice(results, rigs))
-        fits = np.array([each[4] for each in found])
-        inside = np.array([each[2] for each in found if each[4]]).reshape(-1, len(rig.NAMES))
-        good &= not inside.size or not is_too_rare(inside, 0.92, 0.95)
-        good &= size > 0 or not is_too_rare(fits, 0.97, 0.99)
-        hold = dict(zip(rig.NAMES, inside.sum(axis=0).tolist()))
-        rows.append({"size": size, "accepted": int(fits.sum()), "hold": hold})
-        share = f"{inside.mean():>8.1%}" if inside.size else ""
-        print(f"  {size:<8g}{fits.sum():>10}" + "".join(f"{n:>6}" for n in hold.values()) + share, flush=True)
-    return {"commit": commit(), "rigs": rigs, "friction": rows}, good
+def reality(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
+    """Returns what was made of rigs with what reality adds, by row of REAL, and whether that is good enough."""
+    motions, cases = tuple(plant.MOTIONS), []
+    for kind, row in REAL.items():
+        count = options.real if row.named else 5 * options.real
+        for i in range(count):
+            size, seed = row.sizes[i % len(row.sizes)], options.seed + len(cases)
+            cases.append((seed, kind, size, plant.Case(seed, motions[i % len(motions)], **row.fields(size))))
+    rigs = [each._replace(at=None) for each in plant.experiments([case for *_, case in cases], 6.0)]
+    seeds, kinds, sizes, _ = zip(*cases)
+    results = list(pool.map(realistic, [options.fmu] * len(cases), rigs, seeds, kinds, sizes))
+    print(f"  {'':44}{'rigs':>6}{'accepted':>10}{'named':>7}{'intervals with the true value':>32}{'worst miss':>12}")
+    rows, good, named, inside = {}, True, [], []
+    for kind, row in REAL.items():
+        found = [result for result, k in zip(results, kinds) if k == kind]
+        fits = [result for result in found if result.accepted]
+        worst = max([0.0, *(result.missed for result in fits)])
+        hold = [each for result in fits for each in result.inside]
+        counted = {
+            "rigs": len(found),
+            "accepted": len(fits),
+            "named": sum(result.named for result in found),
+            "doubted": sum(result.accepted and result.doubted for result in found),
+            "intervals": [sum(hold), len(hold)],
+            "worst_miss": worst,
+        }
+        rows[kind] = counted
+        share = f"{sum(hold)} of {len(hold)}" if hold else ""
+        print(
+            f"  {row.text:<44}{len(found):>6}{len(fits):>10}{counted['named']:>7}{share:>32}{worst:>12.2g}", flush=True
+        )
+        good &= worst < 1
+        inside += hold
+        if row.named:
+            named += [result.named for result in found]
+        else:
+            good &= not is_too_rare(np.array([r.accepted and not r.doubted for r in found]), 0.95, 0.99)
+    good &= not is_too_rare(np.array(inside), 0.92, 0.95) and np.mean(named) >= 0.8
+    print(
+        f"  {sum(named)} of {len(named)} causes named; {sum(inside)} of {len(inside)} intervals of accepted rigs contain the true value"
+    )
+    print(f"  of the rigs without additions, {rows['nothing']['doubted']} are accepted with a doubt")
+    if options.verbose:
+        for seed, kind, size, result in zip(seeds, kinds, sizes, results):
+            print(seed, kind, size, result.accepted, result.named, f"{result.missed:.2g}", "; ".join(result.words))
+    return {"commit": commit(), "real": rows}, bool(good)
 
 
 def draw(rows: dict, path: Path) -> None:
@@ -235,15 +382,18 @@ def main() -> int:
     parser.add_argument("--counts", type=int, default=rig.COUNTS)
     parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--faulty", type=int, default=0, metavar="N", help="rigs for each fault and size instead")
-    parser.add_argument("--friction", type=int, default=0, metavar="N", help="rigs for each friction instead")
+    parser.add_argument(
+        "--real", type=int, default=0, metavar="N", help="rigs for each row of REAL instead, and 5 N clean ones"
+    )
+    parser.add_argument("--verbose", action="store_true", help="with --real, also print a line for each rig")
     parser.add_argument("--figure", type=Path, help="curves of detection over size, SVG")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.repetitions)
     jobs = [(options.fmu, seed, SENSORS[options.sensors], options.counts, options.motion) for seed in seeds]
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        if options.faulty or options.friction:
-            rows, good = (campaign if options.faulty else friction)(pool, options)
+        if options.faulty or options.real:
+            rows, good = (campaign if options.faulty else reality)(pool, options)
             write(rows, options.out)
             return 0 if good else 1
         found = list(pool.map(repetition, *zip(*jobs)))

@@ -70,10 +70,10 @@ def test_only_torques_and_the_exchanged_couplings(prw, tmp_path, experiment):
     result = prw("identify", "run.csv", "--starts", 2)
     assert result.returncode == 0, result.stderr
     assert "the couplings exchanged" in result.stdout and "measurements of theta3 and theta4" in result.stdout
-    # The note has the units of the table.
+    # The note has the units of the table, SI.
     page = (tmp_path / "out" / "identified" / "report.html").read_text(encoding="utf-8")
     (note,) = re.findall(r'<p class="note">Other values fit the data equally well: (.*?)</p>', page)
-    assert "N·m/deg" in note and "N·m/rad" not in page
+    assert "N·m/rad" in note and "N·m/deg" not in note
     check_estimates(report(tmp_path / "out" / "identified"), experiment.parameters)
 
 

@@ -32,15 +32,17 @@ def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys
     assert (tmp_path / "again.svg").read_bytes() == figure.read_bytes()
 
 
-def test_rigs_with_friction_in_the_input_shafts(fmu, tmp_path, monkeypatch):
-    monkeypatch.setattr(monte_carlo, "FRICTIONS", (0.0, 0.02))
+def test_rigs_with_what_reality_adds(fmu, tmp_path, monkeypatch):
+    chosen = ("friction", "crosstalk", "jitter", "wrapped")
+    monkeypatch.setattr(monte_carlo, "REAL", {name: monte_carlo.REAL[name] for name in ("nothing", *chosen)})
     monkeypatch.setattr(monte_carlo, "commit", lambda: "0123abc")
-    out = tmp_path / "friction.json"
-    arguments = ["monte_carlo.py", str(fmu), "--workers", "1", "--friction", "1", "--out", str(out)]
+    out = tmp_path / "real.json"
+    arguments = ["monte_carlo.py", str(fmu), "--workers", "1", "--real", "1", "--seed", "7", "--out", str(out)]
     monkeypatch.setattr(sys, "argv", arguments)
     assert monte_carlo.main() == 0
-    sound, braked = json.loads(out.read_text())["friction"]
-    assert sound["accepted"] == 1 and braked["accepted"] == 0
+    rows = json.loads(out.read_text())["real"]
+    assert all(rows[name]["named"] == 1 for name in chosen), rows
+    assert rows["nothing"]["accepted"] == 5 and rows["friction"]["accepted"] == 1 and rows["crosstalk"]["accepted"] == 0
 
 
 def test_the_command_for_the_table_of_the_tutorial_repeats_it():

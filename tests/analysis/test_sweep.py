@@ -31,7 +31,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
     result = prw("sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2)
     assert result.returncode == 0, result.stderr
     assert "ran         12 runs on 2 threads" in result.stdout
-    assert "failed      4 runs; run 0: the FMU stopped: fmi2SetReal: k1 must not be below 1e-300" in result.stdout
+    assert "failed      4 runs; run 0: the FMU stopped: k1 must be above 0" in result.stdout
     table = rows(tmp_path / "out" / "sweep")
     assert [row["run"] for row in table] == list(range(12))
     assert [row["status"] for row in table] == ["failed"] * 4 + ["done"] * 8

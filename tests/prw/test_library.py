@@ -218,7 +218,7 @@ def test_wrong_motions() -> None:
 def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
     for arguments, message in [
         ({"parameters": {"k9": 1.0}}, "parameters: k9 is not known; there are J2, J3, H3"),
-        ({"parameters": {"k1": -1.0}}, "the FMU stopped: .*k1 must not be below 1e-300"),
+        ({"parameters": {"k1": -1.0}}, "the FMU stopped: k1 must be above 0, it is -1"),
         ({"parameters": {"N": 7.5}}, "N.* 7.5"),
         ({"parameters": {"k1": np.array([1.0, 2.0])}}, r"k1 is array\(\[1., 2.\]\), not a number; prw.sweep takes"),
         ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),

@@ -238,7 +238,11 @@ ROWS = "\n".join(f"{t},{1 - np.cos(3 * t)},{np.rad2deg(3 * np.sin(3 * t))},0,0" 
     [
         (
             "theta2\n0,3.1,0\n0.01,3.14,0\n0.02,-3.13,0\n0.03,-3.1,0\n",
-            "theta1 jumps by 6.27 rad after 0.01 s; angles must continue past a full turn",
+            "theta1 restarts after full turns, first after 0.01 s; it was continued without the jumps",
+        ),
+        (
+            "theta2\n0,0,0\n0.01,4,0\n0.02,4,0\n",
+            "theta1 jumps by 4 rad after 0 s; angles must continue past a full turn",
         ),
         ("theta2\n0,0,0\n10,0.1,0\n20,0.2,0\n", "a sample every 10 s; if time is in ms, call its column time [ms]"),
         ("omega1,theta2,omega2\n" + ROWS, "omega1 adds up to 57.3 times the motion of theta1"),

@@ -63,7 +63,9 @@ def not_negative(argument: str, value: Any, name: str = "") -> float:
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
     """The central value of a parameter and its relative standard deviation. `given` is (value, deviation), or only the
     deviation; then the central value is `start`. Raises UserError if a number is out of range."""
-    value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
+    if isinstance(given, Sequence) and len(given) != 2:
+        raise UserError(f"{name} {given!r}: write a fraction as in 0.1, or (value, fraction)", argument=argument)
+    value, relative = given if isinstance(given, Sequence) else (start, given)
     if value is start and start == 0:
         raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
     value, relative = positive(argument, value, name), positive(argument, relative, name)
@@ -72,6 +74,15 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
             f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, a fraction of 1", argument=argument
         )
     return value, relative
+
+
+def spelled(argument: str, value: Any, command: bool) -> str:
+    """An argument in the syntax of Python, or as options of the command: `gain=["tau1"]` or `--gain tau1`. value: names, or fractions
+    by name."""
+    if isinstance(value, Mapping):
+        options = " ".join(f"--{argument.removesuffix('s')} {name}={100 * x:g}%" for name, x in value.items())
+        return f"`{options}`" if command else f"`{argument}={json.dumps(value)}`"
+    return f"`--{argument} {','.join(value)}`" if command else f"`{argument}={json.dumps(list(value))}`"
 
 
 def is_path(given: Any) -> bool:

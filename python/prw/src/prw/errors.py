@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import unicodedata
 from typing import Any
 
@@ -19,6 +20,11 @@ def one_line(text: str, longest: int = LONGEST) -> str:
 
 def _escaped(character: str) -> str:
     return character.encode("unicode_escape", "backslashreplace").decode("ascii")
+
+
+def of_fmu(message: str) -> str:
+    """A message of the FMU without names of C functions, and with the limits of positive parameters in usual words."""
+    return re.sub(r"must not be below 1e-\d{3}\b", "must be above 0", re.sub(r"\bfmi[23]Set\w+: ", "", message))
 
 
 class UserError(ValueError):

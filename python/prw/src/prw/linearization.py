@@ -11,7 +11,7 @@ import fmu_run
 import numpy as np
 
 from prw.arguments import Given, names_of, values_of
-from prw.errors import UserError
+from prw.errors import UserError, of_fmu
 from prw.state_space import StateSpace
 from prw.testbed import CONTINUOUS, existing_fmu, loaded
 
@@ -132,7 +132,7 @@ class Linearizer:
                     table[number] = instance.directional_derivative(self._unknowns, known, 1.0)[0]
         except (fmu_run.FmuError, ValueError) as error:
             self._instance = None
-            raise UserError(f"{self.fmu}: cannot be linearized ({error})") from None
+            raise UserError(f"{self.fmu}: cannot be linearized ({of_fmu(str(error))})") from None
         n = len(self.states)
         whole = np.zeros((len(self.outputs), len(self._knowns)))
         whole[self._calculated] = table.T[n:]

@@ -12,6 +12,9 @@ from prw.errors import UserError
 
 Array = NDArray[np.float64]
 
+#: Share of a turn by which a jump may differ from a turn, and least rate of the jump in rad/s, if an angle restarts after a full turn.
+TURN, SUDDEN = 0.1, 30.0
+
 #: Frequency (rad/s) and length (s) of the excitation behind Fig. 4 (Sec. 4).
 FIG4_FREQUENCY = 10 * np.pi
 FIG4_DURATION = 2.0
@@ -20,6 +23,8 @@ FIG4_DURATION = 2.0
 @dataclass(frozen=True)
 class Motion:
     """Motor motion at the communication points.
+
+    Angles that restart after a full turn, as at -pi and pi, are continued, and a note reports it.
 
     Parameters
     ----------
@@ -63,6 +68,11 @@ class Motion:
                 )
         if not (np.diff(self.time) > 0).all():
             raise UserError("motion: time must increase from sample to sample")
+        continued = [unwrapped(name, self.time, column) for name, column in zip(ANGLES, self.theta.T)]
+        notes = [note for _, note in continued if note]
+        if notes:
+            object.__setattr__(self, "theta", np.column_stack([column for column, _ in continued]))
+            object.__setattr__(self, "notes", [*self.notes, *notes])
 
     @property
     def columns(self) -> dict[str, Array]:
@@ -95,6 +105,25 @@ def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     omega1 = np.sin(FIG4_FREQUENCY * time)
     sides = np.array([1, -1 if opposite else 1])
     return Motion(time, np.outer(theta1, sides), np.outer(omega1, sides), "fig4" if opposite else "fig4_equal")
+
+
+def unwrapped(name: str, time: Array, angle: Array) -> tuple[Array, str]:
+    """The angle (n,) rad at the times (n,) s without jumps by a full turn, and a note if there were any. NaN are skipped."""
+    there = np.flatnonzero(np.isfinite(angle))
+    # Values near the largest float overflow without a warning, because the FMU rejects them.
+    with np.errstate(all="ignore"):
+        jumps = np.diff(angle[there])
+        sudden = np.abs(jumps) > SUDDEN * np.diff(time[there])
+        wraps = sudden & (np.abs(np.abs(jumps) - 2 * np.pi) < TURN * 2 * np.pi)
+        # Other sudden jumps show that the column does not contain a smooth angle.
+        if wraps.sum() <= (sudden & ~wraps).sum():
+            return angle, ""
+        continued = angle.copy()
+        continued[there[1:]] -= 2 * np.pi * np.cumsum(np.sign(jumps) * wraps)
+    return (
+        continued,
+        f"{name} restarts after full turns, first after {time[there][:-1][wraps][0]:.6g} s; it was continued without the jumps",
+    )
 
 
 def _numbers(name: str, value: object) -> Array:

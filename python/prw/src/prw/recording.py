@@ -14,7 +14,7 @@ import numpy as np
 from prw.arguments import Table, check_names, columns_of, is_path, is_table, numbers_of
 from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
-from prw.motion import Array, Motion
+from prw.motion import Array, Motion, unwrapped
 from prw.plausibility import notes_on_gaps, notes_on_values
 from prw.table import Choice, read_table
 
@@ -174,8 +174,13 @@ def _read(
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
     # Angles near the largest float overflow without a warning, because the FMU rejects them.
     with np.errstate(all="ignore"):
-        notes = found.notes + notes_on_gaps(path, time, theta) + notes_on_values(time, theta, omega, found.units)
-    return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
+        motion = Motion(time, theta, omega, path.stem, found.notes)
+        for name in table:
+            table[name], note = unwrapped(name, time, table[name]) if QUANTITIES[name] == "angle" else (table[name], "")
+            motion.notes.extend([note] if note else [])
+        motion.notes.extend(notes_on_gaps(path, time, motion.theta))
+        motion.notes.extend(notes_on_values(time, motion.theta, omega, found.units))
+    return Recording(path, motion, table, found.units)
 
 
 def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from prw.arguments import check_names
 from prw.columns import ANGLES, RATES
-from prw.errors import UserError
+from prw.errors import UserError, of_fmu
 from prw.files import CLONE, PACKAGE
 from prw.motion import Array, Motion
 
@@ -138,6 +138,7 @@ class Testbed:
 
 def stopped(why: str) -> str:
     """The message about a run that failed. why: from fmu_run."""
+    why = of_fmu(why)
     return f"the FMU stopped {why}" if why.startswith("at ") else f"the FMU stopped: {why}"
 
 

@@ -30,6 +30,7 @@ from prw.commands.options import (
 )
 from prw.errors import DoesNotFit, UserError, need
 from prw.identification import identify
+from prw.identification.kinds import KINDS
 
 HELP = "estimate parameters from measurements"
 EXAMPLES = """\
@@ -73,6 +74,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         ("delay", "come late"),
         ("lag", "lag, to first order"),
         ("gain", "read too much or too little"),
+        ("drift", "drift slowly"),
     ):
         parser.add_argument(
             f"--{kind}",
@@ -80,6 +82,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             default="",
             metavar="NAMES",
             help=f"channels that may {effect}, separated by commas; the {kind} is estimated, too",
+        )
+    for kind, what in (
+        ("friction", "dry friction, N.m"),
+        ("backlash", "springs k with backlash, rad, or the motors"),
+        ("cubic", "springs with the torque k (twist + cubic twist^3), 1/rad2"),
+        ("crosstalk", "torque channels to which the other torque adds a share"),
+    ):
+        parser.add_argument(
+            f"--{kind}",
+            type=listed,
+            default="",
+            metavar="PLACES",
+            help=f"{what}, which is estimated, too: {', '.join(KINDS[kind].places)}",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
@@ -99,9 +114,9 @@ def run(arguments: argparse.Namespace) -> None:
     report, numbers_, parameters, ssv = (
         arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
     )
-    found.report(report)
+    found.report(report, command=True)
     found.to_json(numbers_)
-    print(found.summary(shown=True))
+    print(found.summary(command=True))
     # Parameters are written only if they are determined, and if the model fits or --write-anyway is given. Otherwise old files
     # are removed, so that they are never next to a new report.
     wrong = not found.fits and not arguments.write_anyway
@@ -111,7 +126,8 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"wrote       {report}, {numbers_}")
     if wrong:
         channels = ", ".join(dict.fromkeys(misfit.channel for misfit in found.verdict.misfits))
-        perhaps = f"; perhaps {found.diagnosis[0]}" if found.diagnosis else ""
+        causes = found.diagnosis_in(command=True)
+        perhaps = f"; perhaps {causes[0]}" if causes else ""
         left = f"; besides, {'; '.join(found.undetermined)}" if found.undetermined else ""
         raise DoesNotFit(
             f"the FMU does not explain the data ({channels}){perhaps}{left}. {report} has the rest; identified.json was "

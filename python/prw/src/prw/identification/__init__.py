@@ -5,10 +5,12 @@ The modules in the order of dependence; `identify` below combines them::
     path                 smoothed motor angles
     experiment           spectra of inputs, of measurements and of the errors of both
     model, response      the FMU's equations and outputs
+    effects              friction, backlash and other effects that the FMU does not model
     fit, statistics      least squares; standard errors and intervals
     verdict, diagnosis   whether the model explains the data, and possible causes if not
     design, excitation   more informative experiments; `prw.excite`
     rounding             digits of numbers
+    residuals            hum, spikes and jitter in the residuals
     findings, results    the return value, as attributes, text and files
     report               the HTML page
 """
@@ -59,6 +61,11 @@ def identify(
     delay: Sequence[str] = (),
     lag: Sequence[str] = (),
     gain: Sequence[str] = (),
+    friction: Sequence[str] = (),
+    backlash: Sequence[str] = (),
+    cubic: Sequence[str] = (),
+    crosstalk: Sequence[str] = (),
+    drift: Sequence[str] = (),
     names: Mapping[str, str] = {},
     skip: int = 0,
     encoding: str = "",
@@ -91,16 +98,26 @@ def identify(
         Whether sensors may have offsets.
     starts, seed
         Number of starting points, and the seed of their random generator.
-    delay, lag, gain
-        Channels with an unknown delay, first-order lag or gain, which are then estimated, too.
+    delay, lag, gain, drift
+        Channels with an unknown delay, first-order lag, gain or slow drift, which are then estimated, too.
+    friction
+        Where there is dry friction (N.m), which is then estimated, too: "shafts" (equal in both input shafts), "shaft1", "shaft2",
+        "output" (equal about pitch and roll), "motor1", "motor2".
+    backlash
+        Springs that have backlash (rad), "k1" or "k2" (equal on both sides), or "motors".
+    cubic
+        Springs with the torque k (twist + cubic twist^3), cubic in 1/rad^2: "k1", "k2".
+    crosstalk
+        Torque channels to which the other torque adds a share: "tau1", "tau2", or "torques" (equal in both).
     fmu
         The testbed FMU (default: as for `prw.simulate`).
 
     Returns
     -------
     Identification
-        Estimates, standard errors, notes and warnings. Data that the model does not explain raise no error, nor do undetermined
-        parameters: see `fits`, `misfits` and `undetermined`.
+        Estimates, standard errors, notes and warnings. If friction, backlash, cubic stiffness or drift explains what the model
+        cannot, they are estimated without a request: see `additions`. Data that remain unexplained raise no error, nor do
+        undetermined parameters: see `fits`, `misfits`, `diagnosis` and `undetermined`.
 
     Raises
     ------
@@ -113,11 +130,12 @@ def identify(
 
     from prw.arguments import values_of
     from prw.identification.design import advice
-    from prw.identification.diagnosis import diagnose
+    from prw.identification.diagnosis import Explanation, explain, over_time
     from prw.identification.experiment import may_be_simulated, prepare
     from prw.identification.fit import fit
+    from prw.identification.kinds import KINDS
     from prw.identification.model import Model
-    from prw.identification.response import DISTORTIONS, Distortion
+    from prw.identification.response import Distortion
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
@@ -130,13 +148,16 @@ def identify(
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
         raise UserError("at least one is needed", argument="files")
-    delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
+    places = {"delay": delay, "lag": lag, "gain": gain, "friction": friction, "backlash": backlash, "cubic": cubic}
+    requested = {kind: names_of(kind, given) for kind, given in {**places, "crosstalk": crosstalk}.items()}
+    drift = names_of("drift", drift)
     # There are many small matrices, with which more threads would be slower.
     with Model(fmu) as model, threadpool_limits(1):
-        kinds = zip(DISTORTIONS, (delay, lag, gain))
-        distortions = tuple(dict.fromkeys(Distortion(kind, name) for kind, names in kinds for name in names))
+        distortions = tuple(
+            dict.fromkeys(Distortion(kind, name) for kind, given in requested.items() for name in given)
+        )
         given = values_of(parameters, model.loaded)
-        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions)
+        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions, drift)
         measured = [
             each.recording()
             if isinstance(each, Run)
@@ -146,13 +167,14 @@ def identify(
             for each in several
         ]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
-        for argument, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
-            check_names(argument, named, channels)
+        for argument, named in (("noise", noise), *requested.items(), ("drift", drift)):
+            check_names(argument, named, argument in KINDS and KINDS[argument].places or channels)
         rates: list[Rates] = [
             "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
             for each in several
         ]
-        experiments = [prepare(each, quantum, how, how != "motors") for each, how in zip(measured, rates)]
+        how = [(quantum, rate, rate != "motors") for rate in rates]
+        experiments = [prepare(each, *more) for each, more in zip(measured, how)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
         # Recordings with very exact motor angles may be simulations of the FMU, in which the motors jump between steps. If the
@@ -165,12 +187,13 @@ def identify(
                 other = fit(model, again, task, starts, seed)
                 if (better := judge(other)).fits:
                     experiments, solution, verdict = again, other, better
-        sure = certainty(solution, verdict.widening)
-        diagnosis = [] if verdict.fits else diagnose(solution, verdict)
-        hints = advice(model, experiments, solution) if sure.undetermined else []
+        found = Explanation(solution, verdict, (), ()) if verdict.fits else explain(solution, verdict)
+        parts = [] if found.verdict.fits or found.known else over_time(model, measured, task, how)
+        sure = certainty(found.solution, found.verdict.widening)
+        hints = advice(model, experiments, found.solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)
-        judged = verdict, tuple(diagnosis), tuple(hints)
-        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *judged)
+        judged = found, tuple(parts), tuple(hints)
+        return Identification(model.fmu, model.known, sources, tuple(experiments), found.solution, sure, *judged)
 
 
 def task_of(
@@ -182,6 +205,7 @@ def task_of(
     noise: Mapping[str, float] = {},
     offsets: bool = True,
     distortions: tuple[Distortion, ...] = (),
+    drift: tuple[str, ...] = (),
 ) -> Task:
     """The task that these arguments of `identify` describe, for an FMU with the parameters `known`. Raises UserError for a
     name that is not known, or a value that is out of range."""
@@ -221,4 +245,4 @@ def task_of(
                 "or another start value in parameters"
             )
     spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
-    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions)
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions, drift)

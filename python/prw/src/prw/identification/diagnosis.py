@@ -1,24 +1,28 @@
-"""Possible causes if the model does not explain the data: faults with a known signature, and fits in which channels have
-a delay, a lag or another gain."""
+"""Possible causes if the model does not explain the data: faults with a known signature, and hypotheses with which the fit is
+repeated. If properties of the rig explain the data, the fit that includes them is the result."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from prw.arguments import spelled
 from prw.columns import QUANTITIES
-from prw.identification.experiment import Experiment
-from prw.identification.fit import Fitter, Solution, refitted
-from prw.identification.response import DISTORTIONS, Distortion
-from prw.identification.statistics import covariance_of, information_of
-from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named, single_faults
-from prw.motion import Array
+from prw.identification.experiment import Experiment, prepare
+from prw.identification.fit import FINE, Fitter, Prior, Solution, Task, fit, refitted
+from prw.identification.kinds import KINDS
+from prw.identification.model import Model
+from prw.identification.response import Distortion
+from prw.identification.rounding import rounded
+from prw.identification.statistics import certainty, covariance_of, information_of
+from prw.identification.verdict import CLEAR, PAIRS, Hypothesis, Verdict, hypotheses, judge
+from prw.motion import Array, Motion
 from prw.progress import Progress
+from prw.recording import Recording
 
 #: Gains that a wrong unit causes, within the factor TOLERANCE, each with the description of the fault.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
@@ -30,72 +34,311 @@ ALIKE, UNLIKE = 0.9, 0.7
 FLAT, FLATS, STUCK = 4, 3, 0.25
 #: The motors are at rest while the rate of the faster one is at most this share of its maximum.
 AT_REST = 1e-3
-#: Number of groups of channels that are fitted for each kind of distortion.
+#: Number of hypotheses of each kind with which the fit is repeated.
 TRIED = 2
-#: Another fault is named if its gain in likelihood exceeds this share of the best fault's: SHARE for an alternative to
-#: the best fault, SECOND for a fault that remains after the best one is included.
-SHARE, SECOND = 0.6, 0.05
+#: A hypothesis is tried if its expected gain in likelihood exceeds this share of the largest expected gain.
+WORTH_TRYING = 0.03
+#: Gain in likelihood for each unknown below which a hypothesis counts as chance.
+COST = 12.0
+#: Hypotheses that explain the data with a gain in likelihood that differs by less than this are not distinguished.
+ALIKE_GAIN = 25.0
+#: Maximum number of hypotheses that are combined. A further one must gain more than this share of the first one's gain.
+MOST, SECOND = 4, 0.01
+#: The hypothesis that the inertias differ from the drawing, and their standard deviation in the fit that frees them.
+INERTIAS, DRAWING = Hypothesis("inertias", ("J2", "J3", "H3")), 0.1
+TORQUES = ("tau1", "tau2")
+#: Numbers of parts in which a recording is fitted, and minimum number of rows of a part. A parameter changes if the difference exceeds
+#: this number of standard errors.
+PARTS, SHORTEST, CHANGED = (2, 4), 1000, 6.0
 
 
-def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
-    """Possible causes, a sentence each, the most likely first."""
-    found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _obvious_causes(solution, i, e)]
-    if found:
-        return list(dict.fromkeys(found))
-    causes = _causes(solution, verdict)
-    reported = [cause.message for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
-    if causes and not causes[0].explains:
-        # Causes that remain if the first one is included in the fit.
-        after = causes[0].after()
-        left = judge(after)
-        others = [] if left.fits else _causes(after, left)
-        others = [c for c in others if c.name != causes[0].name and c.gain > SECOND * causes[0].gain]
-        reported = [causes[0].message, *(f"besides, {other.message}" for other in others[:1])] if others else reported
-    return reported
-
-
-class _Cause(NamedTuple):
-    """A possible cause.
+class Cause(NamedTuple):
+    """A possible cause of a misfit.
 
     Attributes
     ----------
-    gain
-        Rise of twice the log likelihood if the cause is included, less 12 for each distorted channel.
-    name, message
-        Name of the fault and its description.
-    explains
-        Whether the data fit if the cause is included; False if this was not tested.
-    after
-        Returns the fit that includes the cause.
+    text
+        Description, with sizes.
+    argument, value
+        The argument of `identify` with which it is estimated, too; empty if there is none.
+    hint
+        What would distinguish it from other causes; empty if it is the only one.
     """
 
+    text: str
+    argument: str = ""
+    value: Any = ()
+    hint: str = ""
+
+    def message(self, command: bool = False) -> str:
+        """The description and the remedy in one sentence. command: whether the remedy is an option of the command, instead of a
+        Python argument."""
+        remedy = f" (to estimate it, add {spelled(self.argument, self.value, command)})" if self.argument else ""
+        return f"{self.text}{remedy}{'; ' if self.hint else ''}{self.hint}"
+
+
+class Explanation(NamedTuple):
+    """The result of a search for causes.
+
+    Attributes
+    ----------
+    solution, verdict
+        The fit with the properties of the rig that were found, and its verdict. Without any, the fit and verdict before.
+    causes
+        Possible causes of the misfit, the most likely first; also those that are in `solution`.
+    tried
+        Names of the hypotheses with which the fit was repeated.
+    known
+        Whether the causes explain the data.
+    """
+
+    solution: Solution
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    tried: tuple[str, ...]
+    known: bool = True
+
+
+class _Trial(NamedTuple):
+    """A fit that includes one more hypothesis. gain: rise of twice the log likelihood, less COST for each unknown."""
+
+    hypothesis: Hypothesis
     gain: float
-    name: str
-    message: str
-    explains: bool
-    after: Callable[[], Solution]
+    solution: Solution
+    verdict: Verdict
 
 
-def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
-    """Possible causes, in decreasing order of gain."""
-    causes = list(_refits(solution, verdict))
-    signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
-    for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
-        size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
-        message = f"{fault.name} of {size} would explain at least a part of the misfit: the residual follows the sign of a rate"
-        causes.append(_Cause(fault.gain, fault.name, message, False, partial(_with_fault, solution, fault.name)))
-    return sorted(causes, key=lambda cause: -cause.gain)
+def explain(solution: Solution, verdict: Verdict) -> Explanation:
+    """Search for causes of a misfit."""
+    found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _obvious_causes(solution, i, e)]
+    if found:
+        return Explanation(solution, verdict, tuple(map(Cause, dict.fromkeys(found))), ())
+    best = _Trial(INERTIAS, 0.0, solution, verdict)
+    chosen: list[_Trial] = []
+    rivals: list[_Trial] = []
+    tried: dict[str, None] = {}
+    for _ in range(MOST):
+        trials = _trials(best.solution, best.verdict)
+        tried.update(dict.fromkeys(str(trial.hypothesis) for trial in trials))
+        first = chosen[0].gain if chosen else 0.0
+        if not trials or trials[0].gain < max(CLEAR**2, SECOND * first):
+            break
+        best = trials[0]
+        if not best.verdict.fits:
+            # Far from the solution, the patterns of large effects need more rounds.
+            refined = refitted(best.solution, tolerances=FINE)
+            best = best._replace(solution=refined, verdict=judge(refined))
+        chosen.append(best)
+        rivals = [t for t in trials[1:] if t.verdict.fits and t.gain > best.gain - ALIKE_GAIN]
+        # A delay of more channels is not another cause.
+        rivals = [
+            t
+            for t in rivals
+            if t.hypothesis.kind != best.hypothesis.kind or not set(t.hypothesis.places) & set(best.hypothesis.places)
+        ]
+        # A gain of all torques and wrong inertias have nearly the same effect.
+        if best.hypothesis == INERTIAS or _all_torques(best.hypothesis, solution):
+            rivals += [t for t in trials[1:] if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, solution)]
+        rivals = list({t.hypothesis: t for t in rivals}.values())
+        if best.verdict.fits:
+            break
+    causes = _described(best, chosen, rivals)
+    if not best.verdict.fits or not all(each.hypothesis.belongs for each in [*chosen, *rivals]):
+        return Explanation(solution, verdict, tuple(causes), tuple(tried), best.verdict.fits)
+    exact = refitted(best.solution, tolerances=FINE)
+    judged = judge(exact)
+    if not judged.fits:
+        return Explanation(solution, verdict, tuple(causes), tuple(tried))
+    # The intervals contain the estimates with every rival.
+    count, widening = len(solution.task.names), judged.widening.copy()
+    for rival in rivals:
+        widening[:count] = np.hypot(
+            widening[:count], (rival.solution.logarithms - exact.logarithms[: len(rival.solution.logarithms)])[:count]
+        )
+    return Explanation(exact, judged._replace(widening=widening), tuple(causes), tuple(tried))
 
 
-def _with_fault(solution: Solution, name: str) -> Solution:
-    """The fit with this fault, of unknown size, in all experiments. It is repeated once, because the effect of the
-    fault depends on the rates that the fit finds."""
-    found = solution
-    for _ in range(2):
-        pairs = zip(found.fitter.experiments, found.comparisons)
-        faults = [[column for n, _, column in single_faults(found, *pair) if n == name] for pair in pairs]
-        found = refitted(found, (), faults)
+class Part(NamedTuple):
+    """A fit of a part of the recordings: from and to these fractions of each one's duration."""
+
+    begin: float
+    end: float
+    solution: Solution
+    errors: Array
+
+    def value(self, name: str) -> tuple[float, float]:
+        """The parameter's estimate and its standard error, SI."""
+        value, i = self.solution.values[name], self.solution.task.names.index(name)
+        return value, value * float(self.errors[i])
+
+
+def over_time(model: Model, recordings: Sequence[Recording], task: Task, how: Sequence[Any]) -> list[Part]:
+    """The fits of halves of the recordings, or else of quarters, if all parts fit and a parameter changes; else an empty list. how: the
+    further arguments of `prepare` for each recording."""
+    for count in PARTS:
+        found = []
+        for k in range(count):
+            sections = [_section(each, k / count, (k + 1) / count) for each in recordings]
+            if min(len(each.time) for each in sections) < SHORTEST:
+                return []
+            solution = fit(model, [prepare(each, *more) for each, more in zip(sections, how)], task, 1)
+            verdict = judge(solution)
+            if not verdict.fits:
+                break
+            found.append(Part(k / count, (k + 1) / count, solution, certainty(solution, verdict.widening).relative))
+        if len(found) == count:
+            return found if changes(found) else []
+    return []
+
+
+def changes(parts: Sequence[Part]) -> list[str]:
+    """The parameters that differ significantly between parts, with their values in SI."""
+    found = []
+    for name in parts[0].solution.task.names if parts else ():
+        values = [part.value(name) for part in parts]
+        low, high = min(values), max(values)
+        if high[0] - low[0] > CHANGED * np.hypot(low[1], high[1]):
+            each = ", ".join(" +- ".join(rounded(*value)) for value in values)
+            found.append(f"{name} changes over time ({each} in {len(parts)} parts of equal length)")
     return found
+
+
+def _section(recording: Recording, begin: float, end: float) -> Recording:
+    """The rows of a recording between two fractions of its length."""
+    motion, rows = recording.motion, slice(int(begin * len(recording.time)), int(end * len(recording.time)))
+    omega = None if motion.omega is None else motion.omega[rows]
+    cut = Motion(motion.time[rows], motion.theta[rows], omega, motion.name, motion.notes)
+    return replace(recording, motion=cut, measured={name: y[rows] for name, y in recording.measured.items()})
+
+
+def _all_torques(hypothesis: Hypothesis, solution: Solution) -> bool:
+    """Whether it is a gain of all torque channels that were measured."""
+    return hypothesis.kind == "gain" and set(hypothesis.places) == set(TORQUES) & set(solution.fitter.channels)
+
+
+def _trials(solution: Solution, verdict: Verdict) -> list[_Trial]:
+    """Fits with one more hypothesis, in decreasing order of gain."""
+    clear: dict[Hypothesis, float] = {}
+    for fault in verdict.faults:
+        clear[fault.hypothesis] = max(fault.gain, clear.get(fault.hypothesis, 0.0))
+
+    def expected_gain(hypothesis: Hypothesis) -> float:
+        """The gain in likelihood expected of a hypothesis, less 10 for each place. So a group ranks below a channel that explains
+        as much alone."""
+        like = "delay" if hypothesis.kind == "lag" else hypothesis.kind
+        parts = sum(clear.get(Hypothesis(like, (name,)), 0.0) for name in hypothesis.places)
+        return max(parts, clear.get(Hypothesis(like, hypothesis.places), 0.0)) - 10 * len(hypothesis.places)
+
+    ranked: list[tuple[float, Hypothesis]] = []
+    for kind in (*KINDS, "drift"):
+        each = sorted(((expected_gain(h), h) for h in hypotheses(solution, kind)), key=lambda pair: -pair[0])
+        ranked += each[:TRIED]
+    least = max(CLEAR**2 / 2, WORTH_TRYING * max((gain for gain, _ in ranked), default=0.0))
+    chosen = [hypothesis for gain, hypothesis in ranked if gain > least]
+    measured = set(TORQUES) & set(solution.fitter.channels)
+    if (
+        measured
+        and not set(INERTIAS.places) & set(solution.task.names)
+        and set(INERTIAS.places) <= set(solution.task.start)
+    ):
+        chosen.append(INERTIAS)
+    trials = []
+    with Progress("looking for causes", len(chosen)) as progress:
+        for done, hypothesis in enumerate(chosen):
+            progress(done)
+            found = _including(solution, hypothesis)
+            unknowns = max(len(hypothesis.distortions), 3 if not hypothesis.distortions else 1)
+            gain = solution.deviance - found.deviance - COST * unknowns
+            # Only friction and backlash of the right sign exist.
+            if not hypothesis.signs or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
+                trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 else verdict))
+    return sorted(trials, key=lambda trial: -trial.gain)
+
+
+def _including(solution: Solution, hypothesis: Hypothesis) -> Solution:
+    """The fit that includes a hypothesis."""
+    if hypothesis == INERTIAS:
+        start = solution.task.start
+        return refitted(solution, priors={name: Prior(start[name], DRAWING) for name in hypothesis.places})
+    if hypothesis.kind == "drift":
+        return refitted(solution, drift=hypothesis.places)
+    return refitted(solution, hypothesis.distortions)
+
+
+def _described(best: _Trial, chosen: list[_Trial], rivals: list[_Trial]) -> list[Cause]:
+    """The causes in words, of the fit with all of them, and rivals of the last one."""
+    found = []
+    for i, trial in enumerate(chosen):
+        last = trial is chosen[-1]
+        then = "with that, the data fit" if last and trial.verdict.fits else "that explains a part of the misfit"
+        found.append(_cause(trial, best.solution, f"{'besides, ' if i else ''}", then))
+    for rival in rivals:
+        kinds = {best.hypothesis.kind, rival.hypothesis.kind}
+        fits = "fits as well" if rival.verdict.fits else "explains a part"
+        found.append(_cause(rival, rival.solution, "or ", fits)._replace(hint=_deciding(kinds)))
+    return found
+
+
+def _deciding(kinds: set[str]) -> str:
+    """The recording or measurement that distinguishes two kinds of causes."""
+    if "inertias" in kinds:
+        return "no motion distinguishes these two; weigh the parts, or load the torque sensors with a known torque"
+    if "crosstalk" in kinds:
+        return "to decide, record a motion with one motor at rest"
+    if kinds <= {"delay", "lag"}:
+        return "to decide, record a motion with higher frequencies"
+    if "drift" in kinds:
+        return "to decide, record the same motion for twice as long"
+    return (
+        "to decide, record the same motion with half the amplitude, too, and identify both recordings together: only the true cause "
+        "has the same size in both"
+    )
+
+
+def _cause(trial: _Trial, solution: Solution, begin: str, then: str) -> Cause:
+    """The cause in words, with the sizes that a fit found."""
+    kind, places = trial.hypothesis
+    task = solution.task
+    if trial.hypothesis == INERTIAS:
+        off = (np.exp(solution.logarithms[task.names.index(n)]) / task.start[n] - 1 for n in places)
+        sizes = ", ".join(f"{name} {100 * x:+.1f} %" for name, x in zip(places, off))
+        value: Any = dict.fromkeys(places, DRAWING)
+        return Cause(f"{begin}the inertias differ from the start values ({sizes}): {then}", "priors", value)
+    if kind == "drift":
+        spans = [
+            np.ptp(c.drift[:, e.channels.index(p)])
+            for e, c in zip(solution.fitter.experiments, solution.comparisons)
+            for p in places
+            if p in e.channels
+        ]
+        return Cause(f"{begin}{places[0]} drifts slowly, by {max(spans):.2g} in SI: {then}", kind, places)
+    return Cause(f"{begin}{_sizes(solution, trial.hypothesis.distortions)}: {then}", kind, places)
+
+
+def _sizes(solution: Solution, distortions: tuple[Distortion, ...]) -> str:
+    """The sizes of distortions of a fit; channels with equal sizes are listed together."""
+    errors = np.sqrt(np.diag(covariance_of(information_of(solution.jacobians) + solution.task.prior_information())))
+    sizes: dict[str, list[str]] = {}
+    for distortion in distortions:
+        i = solution.task.unknowns.index(str(distortion))
+        x = float(solution.logarithms[i])
+        size, name = _size(distortion, distortion.value(x), float(errors[i]))
+        sizes.setdefault(size, []).append(name)
+    return "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
+
+
+def _size(distortion: Distortion, value: float, error: float) -> tuple[str, str]:
+    """The size in words, and the name of the channel or the effect. error: of the unknown."""
+    kind = KINDS[distortion.kind]
+    if distortion.kind == "gain":
+        return f"reads {value:.4g} +- {error * value:.1g} times the true value", distortion.channel
+    sized = f"{abs(value) / kind.factor:.3g} +- {error * kind.scale / kind.factor:.1g}"
+    if distortion.kind == "lag":
+        return f"lags with a time constant of {'-' if value < 0 else ''}{sized} ms", distortion.channel
+    if distortion.kind == "delay":
+        return f"comes {sized} ms {'late' if value > 0 else 'early'}", distortion.channel
+    amount = rounded(value / kind.factor, error * kind.scale / kind.factor)
+    return f"of {' +- '.join(amount)} {kind.unit}", str(distortion)
 
 
 def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
@@ -159,59 +402,3 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
         yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"
-
-
-def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
-    """Distortions of single channels, of pairs and of all channels, as possible causes."""
-    clear = {fault.name: fault.gain for fault in verdict.faults}
-
-    def expected_gain(kind: str, group: Sequence[str]) -> float:
-        """The gain in likelihood expected of a group, less 10 for each channel. So a group ranks below a channel that explains
-        as much alone."""
-        like = "gain" if kind == "gain" else "delay"
-        parts = sum(clear.get(named(like, (name,)), 0.0) for name in group)
-        return max(parts, clear.get(named(like, group), 0.0)) - 10 * len(group)
-
-    tried = []
-    for kind in DISTORTIONS:
-        trials = sorted(groups(solution, kind), key=lambda group: -expected_gain(kind, group))
-        tried += [(kind, group) for group in trials[:TRIED]]
-    # Only the best set of a kind is reported.
-    best: dict[str, tuple[float, tuple[Distortion, ...], Solution]] = {}
-    with Progress("looking for causes", len(tried)) as progress:
-        for done, (kind, group) in enumerate(tried):
-            progress(done)
-            new = tuple(Distortion(kind, name) for name in group)
-            found = refitted(solution, new)
-            gain = solution.deviance - found.deviance - 12 * len(group)
-            if kind not in best or gain > best[kind][0]:
-                best[kind] = gain, new, found
-    greatest = max((gain for gain, *_ in best.values()), default=0.0)
-    for kind, (gain, new, found) in best.items():
-        if gain >= max(SHARE * greatest, CLEAR**2):
-            good = judge(found).fits
-            then = "with that, the data fit" if good else "that explains a part of the misfit"
-            channels = ",".join(distortion.channel for distortion in new)
-            message = (
-                f"{_sizes(found, new)}: {then} (`identify` estimates it, too, with the argument {kind}: {channels})"
-            )
-            yield _Cause(gain, kind, message, good, partial(refitted, solution, new))
-
-
-def _sizes(found: Solution, new: tuple[Distortion, ...]) -> str:
-    """The estimates of the distortions `new`, the last unknowns of a fit, as a string; channels with equal estimates are
-    listed together."""
-    errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
-    sizes: dict[str, list[str]] = {}
-    for distortion, x, error in zip(new, found.logarithms[-len(new) :], errors[-len(new) :]):
-        sizes.setdefault(_size(distortion, distortion.value(x), float(error)), []).append(distortion.channel)
-    return "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-
-
-def _size(distortion: Distortion, value: float, error: float) -> str:
-    if distortion.kind == "gain":
-        return f"reads {value:.4g} +- {error * value:.1g} times the true value"
-    late = "late" if value > 0 else "early"
-    if distortion.kind == "lag":
-        return f"lags with a time constant of {value * 1e3:.3g} +- {error:.1g} ms"
-    return f"comes {abs(value) * 1e3:.3g} +- {error:.1g} ms {late}"

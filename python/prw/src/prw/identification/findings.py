@@ -9,12 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from prw.columns import si_unit
+from prw.identification.diagnosis import Explanation, Part, changes
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
+from prw.identification.kinds import KINDS, Kind
 from prw.identification.model import Parameters
+from prw.identification.residuals import note_on_times, notes_on_residuals
 from prw.identification.rounding import rounded
 from prw.identification.statistics import Certainty
-from prw.identification.verdict import Verdict
+from prw.identification.verdict import Verdict, common_gain
 from prw.motion import Array
 
 #: If residuals and given noise differ by more than this factor, a note reports it.
@@ -108,9 +111,48 @@ class Findings:
     experiments: tuple[Experiment, ...]
     solution: Solution
     sure: Certainty
-    verdict: Verdict
-    diagnosis: tuple[str, ...]
+    explanation: Explanation
+    parts: tuple[Part, ...]
     advice: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the model explains the data, together with `additions`."""
+        return self.explanation.verdict
+
+    @property
+    def additions(self) -> list[str]:
+        """Properties of the rig that the FMU does not model and that the fit includes, with their sizes."""
+        task, found = self.solution.task, []
+        for d in task.distortions:
+            kind, (value, error) = KINDS[d.kind], self.distortions[str(d)]
+            if kind.belongs:
+                found.append(f"{d} of {' +- '.join(rounded(value / kind.factor, error / kind.factor))} {kind.unit}")
+        return found + ([f"slow drift of {', '.join(task.drift)}"] if task.drift else [])
+
+    def kind_of(self, name: str) -> Kind:
+        """The kind of a distortion in `distortions`, with its unit for messages."""
+        return next(KINDS[d.kind] for d in self.solution.task.distortions if str(d) == name)
+
+    @property
+    def diagnosis(self) -> list[str]:
+        """Possible causes if the model does not explain the data, the most likely first."""
+        return self.diagnosis_in()
+
+    def diagnosis_in(self, *, command: bool = False) -> list[str]:
+        """The diagnosis, with remedies as options of the command if `command` is true, otherwise as arguments of Python."""
+        if self.fits:
+            return []
+        found = [f"{change}: with that, each part fits" for change in changes(self.parts)]
+        if not self.explanation.known:
+            found += filter(None, map(note_on_times, self.experiments, self.solution.modelled))
+        return found + [cause.message(command) for cause in self.explanation.causes]
+
+    @property
+    def unknown_cause(self) -> str:
+        """What was tried if no cause was found."""
+        tried = ", ".join([*self.explanation.tried, "changes over time, by fits of parts"])
+        return f"no known cause; none of these explains the data: {tried}"
 
     @property
     def parameters(self) -> dict[str, Estimate]:
@@ -130,7 +172,7 @@ class Findings:
 
     @property
     def distortions(self) -> dict[str, tuple[float, float]]:
-        """Estimated delays and lags (s) and gains with their standard errors, by name."""
+        """Estimated distortions, such as delays (s), gains and friction (N.m), with their standard errors in SI, by name."""
         task, found = self.solution.task, {}
         for i, distortion in enumerate(task.distortions, len(task.names)):
             value = distortion.value(float(self.solution.logarithms[i]))
@@ -185,22 +227,17 @@ class Findings:
     @property
     def notes(self) -> list[str]:
         """Notes and warnings for the user, one line each, in SI."""
-        return self.notes_in(shown=False)
-
-    def notes_in(self, *, shown: bool) -> list[str]:
-        """Notes and warnings for the user, one line each. If `shown` is true, parameters are in display units, otherwise in SI."""
         solution, sure = self.solution, self.sure
         lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
+        for e, modelled in zip(self.experiments, solution.modelled):
+            lines += notes_on_residuals(e, modelled)
         for name in solution.task.names:
             low, high = solution.task.bounds[name]
             if min(self.values[name] / low, high / self.values[name]) < 1.001:
                 lines.append(f"the estimate of {name} is at its bound; give wider bounds, or check the data")
         for point, _ in solution.rivals:
-            values = ", ".join(
-                f"{name} {value / factor:.4g} {unit}"
-                for name, value in zip(solution.task.names, np.exp(point))
-                for factor, unit in [self._unit(name, shown)]
-            )
+            pairs = zip(solution.task.names, np.exp(point))
+            values = ", ".join(f"{name} {value:.4g} {self.known.real[name].unit}" for name, value in pairs)
             swapped = self._exchanged(point)
             lines.append(
                 f"other values fit the data equally well: {values}{' (the couplings exchanged)' if swapped else ''}; "
@@ -210,10 +247,23 @@ class Findings:
                 lines.append("measurements of theta3 and theta4 distinguish solutions with exchanged couplings")
         first = self.verdict.suggested
         if self.fits and first is not None and not sure.undetermined:
+            kind = KINDS.get(first.hypothesis.kind)
+            factor = kind.factor if kind else 1.0
+            size = " +- ".join(rounded(first.size / factor, first.error / factor))
+            size = f"{size} {first.hypothesis.unit}".rstrip()
+            lines.append(f"intervals allow for a {first.name} of {size}, which the data suggest but do not prove")
+        if gain := common_gain(solution):
             lines.append(
-                f"intervals allow for a {first.name} of {' +- '.join(rounded(first.size, first.error))} {first.unit}".rstrip()
-                + ", which the data suggest but do not prove"
+                f"a gain of all torques of {np.exp(gain):.4g} has the same effect as inertias that differ from the start values by "
+                f"{np.expm1(gain):+.1%}; the intervals contain both. To decide, weigh the parts, or load the torque sensors with a known "
+                "torque"
             )
+        if self.fits:
+            lines += [
+                f"the data fit about as well with another cause: {c.message()}"
+                for c in self.explanation.causes
+                if c.hint
+            ]
         for name in solution.task.noise:
             times = self._times_its_noise(name)
             if not 1 / UNLIKE < times < UNLIKE:
@@ -230,11 +280,6 @@ class Findings:
                 "the noise is not white, for example because angles are quantised; the standard errors take this into account"
             )
         return list(dict.fromkeys(lines))
-
-    def _unit(self, name: str, shown: bool) -> tuple[float, str]:
-        """Factor and unit of a parameter: the display unit or SI."""
-        parameter = self.known.real[name]
-        return (parameter.factor, parameter.shown) if shown else (1.0, parameter.unit)
 
     def _times_its_noise(self, name: str) -> float:
         """Ratio of a channel's residuals in the band to the expectation from noise and encoders."""

@@ -22,7 +22,9 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from prw.errors import UserError
-from prw.identification.experiment import Experiment
+from prw.identification.effects import columns
+from prw.identification.experiment import Experiment, spectra
+from prw.identification.kinds import FILTERS
 from prw.identification.model import Model
 from prw.identification.response import FURTHEST, Discrete, Distortion, Response, discrete
 from prw.motion import Array
@@ -35,8 +37,12 @@ DIFFERENCE = 1e-4
 UNDETERMINED = 1e-9
 #: Fitting and estimating the noise alternate for at most ROUNDS rounds (FEW_ROUNDS for the comparison of causes), until
 #: the noise changes by less than SETTLED. In each round the noise is estimated at most NOISE_ROUNDS times.
-ROUNDS, FEW_ROUNDS, SETTLED = 12, 2, 0.003
+ROUNDS, FEW_ROUNDS, SETTLED = 12, 4, 0.003
 NOISE_ROUNDS = 30
+#: The patterns of effects are repeated until the unknowns change by less than this.
+FOLLOWED = 2e-4
+#: Highest degree of the polynomials that describe the drift of a channel.
+DRIFT = 3
 #: Least distance of the start of a search from the bounds.
 INSIDE = 1e-6
 #: Tolerances of a search.
@@ -73,7 +79,9 @@ class Task:
     offsets
         Whether each channel has an unknown offset.
     distortions
-        Distortions of channels, whose unknowns follow the logarithms of the parameters in every point (p,).
+        Distortions, whose unknowns follow the logarithms of the parameters in every point (p,).
+    drift
+        Channels that may drift slowly.
     """
 
     names: tuple[str, ...]
@@ -83,6 +91,7 @@ class Task:
     noise: Mapping[str, float]
     offsets: bool
     distortions: tuple[Distortion, ...]
+    drift: tuple[str, ...] = ()
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -108,6 +117,23 @@ class Task:
         return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.unknowns])
 
 
+def polynomials(count: int) -> Array:
+    """Legendre polynomials (count, DRIFT) of the degrees from 1 at `count` points from -1 to 1."""
+    return np.asarray(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), DRIFT)[:, 1:], dtype=np.float64)
+
+
+def slow(experiment: Experiment, channels: Sequence[str]) -> Complex:
+    """Spectra (needed_bins, c, q) of `polynomials` over time in each of the channels."""
+    shapes = spectra(polynomials(len(experiment.time)))[: experiment.needed_bins]
+    found = np.zeros((experiment.needed_bins, len(experiment.channels), 0), dtype=complex)
+    for i, name in enumerate(experiment.channels):
+        if name in channels:
+            more = np.zeros((*found.shape[:2], DRIFT), dtype=complex)
+            more[:, i] = shapes
+            found = np.concatenate([found, more], axis=2)
+    return found
+
+
 class Comparison:
     """An experiment compared with the model, for one set of parameters and given noise.
 
@@ -120,6 +146,8 @@ class Comparison:
         (c,), offsets of the sensors, SI.
     initial
         (6,), difference x[0] - x[n] of the states at the start and at the end.
+    drift
+        (n, c), drift of the channels, SI.
     """
 
     def __init__(
@@ -128,10 +156,8 @@ class Comparison:
         response: Response,
         task: Task,
         noise: Mapping[str, float],
-        faults: Sequence[Complex],
     ):
-        """noise: standard deviations by channel, SI. faults: spectra (needed_bins, c) that the channels may contain, each
-        with an unknown factor."""
+        """noise: standard deviations by channel, SI."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -144,13 +170,13 @@ class Comparison:
         steady = np.zeros((experiment.needed_bins, channels, channels if task.offsets else 0), dtype=complex)
         steady[0] = np.sqrt(len(experiment.time)) * np.eye(*steady.shape[1:])
         # The first samples of a channel with a delay or lag depend on the time before the recording.
-        late = {d.channel for d in task.distortions if d.kind != "gain"}
+        late = {d.channel for d in task.distortions if d.kind in ("delay", "lag")}
         edges = [i for i, name in enumerate(experiment.channels) if name in late]
         early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
         s = 1j * np.arange(experiment.needed_bins) / experiment.bins
         for k, i in enumerate(edges):
             early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
-        linear = [steady, *(fault[:, :, None] for fault in faults), early, self.response.transients]
+        linear = [steady, slow(experiment, task.drift), early, self.response.transients]
         nuisance = experiment.observed(np.concatenate(linear, axis=2))
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
@@ -162,6 +188,10 @@ class Comparison:
         self._basis = left[:, determined]
         found = (right[determined].T / sizes[determined]) @ (self._basis.T @ flat[:, -1])
         self.residual = self.project(white[..., -1])
+        paths = polynomials(len(experiment.time))
+        first, drifting = steady.shape[2], [i for i, name in enumerate(experiment.channels) if name in task.drift]
+        self.drift = np.zeros((len(experiment.time), channels))
+        self.drift[:, drifting] = paths @ found[first : first + DRIFT * len(drifting)].reshape(-1, DRIFT).T
         self.offsets, self.initial = found[:channels] if task.offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
 
@@ -306,11 +336,9 @@ class Fitter:
         experiments: Sequence[Experiment],
         task: Task,
         noise: Mapping[str, float] = {},
-        faults: Sequence[Sequence[Complex]] = (),
     ):
-        """noise: of all channels, by name, SI; default: as given in the task, else a twentieth of the values' standard deviation.
-        faults: of each experiment, see Comparison."""
-        self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
+        """noise: of all channels, by name, SI; default: as given in the task, else a twentieth of the values' standard deviation."""
+        self.model, self.experiments, self.task = model, experiments, task
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
         spread = dict.fromkeys(self.channels, 1e-12)
         self._finest, self._stepped = dict.fromkeys(self.channels, 0.0), dict.fromkeys(self.channels, 0.0)
@@ -321,13 +349,35 @@ class Fitter:
                 self._stepped[name] = max(self._stepped[name], float(e.channel_power[:, i].mean()))
         self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
+        #: The effects of each experiment (all_bins, c) per unit of their sizes, see `effects`.
+        self._effects: list[dict[Distortion, Complex]] = [{} for _ in experiments]
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
-        distortions = dict(zip(self.task.distortions, logarithms[len(self.task.names) :].tolist()))
         models = self._discrete(self._models([logarithms]), experiment)
-        return Response(Discrete(*(block[0] for block in models)), experiment, bins, distortions)
+        effects = next(f for e, f in zip(self.experiments, self._effects) if e is experiment)
+        model = Discrete(*(block[0] for block in models))
+        return Response(model, experiment, bins, self._unknowns(logarithms), effects)
+
+    def _unknowns(self, logarithms: Array) -> dict[Distortion, float]:
+        return dict(zip(self.task.distortions, logarithms[len(self.task.names) :].tolist()))
+
+    def effects(self, logarithms: Array, wanted: Sequence[Distortion]) -> list[dict[Distortion, Complex]]:
+        """For each experiment, the contributions (all_bins, c) of the wanted effects to the channels, per unit of their sizes."""
+        sizes = {d: d.value(x) for d, x in self._unknowns(logarithms).items() if d.kind not in FILTERS}
+        (model,), values = self._models([logarithms]), self.task.values(logarithms)
+        return [
+            columns(model, values, e, self._response(logarithms, e, e.all_bins), comparison.initial, sizes, wanted)
+            for e, comparison in zip(self.experiments, self.compare(logarithms))
+        ]
+
+    def follow(self, point: Array) -> None:
+        """Repeat the patterns of the task's effects for the motion at this point."""
+        wanted = [d for d in self.task.distortions if d.kind not in FILTERS]
+        if wanted:
+            self._effects = self.effects(point, wanted)
+            self._responses, self._comparisons = (b"", []), ((), [])
 
     def compare(self, logarithms: Array) -> list[Comparison]:
         """Compare every experiment with the FMU at one set of parameters."""
@@ -337,8 +387,8 @@ class Fitter:
             self._responses = at, [self._response(logarithms, e, e.needed_bins) for e in self.experiments]
         key = (at, *self.noise.items())
         if self._comparisons[0] != key:
-            parts = zip(self.experiments, self._responses[1], self.faults or [()] * len(self.experiments))
-            self._comparisons = key, [Comparison(e, r, self.task, self.noise, faults) for e, r, faults in parts]
+            parts = zip(self.experiments, self._responses[1])
+            self._comparisons = key, [Comparison(e, r, self.task, self.noise) for e, r in parts]
         return self._comparisons[1]
 
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
@@ -359,7 +409,8 @@ class Fitter:
         found = []
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
             whole = self._response(logarithms, experiment, experiment.all_bins)
-            found.append(experiment.signals(whole.outputs + whole.transients @ comparison.initial) + comparison.offsets)
+            steady = spectra(comparison.drift) + whole.outputs + whole.transients @ comparison.initial
+            found.append(experiment.signals(steady) + comparison.offsets)
         return found
 
     def residuals(self, logarithms: Array) -> Array:
@@ -399,12 +450,15 @@ class Fitter:
     def settle(self, point: Array, rounds: int = ROUNDS, tolerances: Mapping[str, float] = FINE) -> Array:
         """Fit and estimate the noise in turns, until the noise settles, but at most `rounds` times."""
         for _ in range(rounds):
-            point, before = self.search(point, tolerances).x, self.noise
+            self.follow(point)
+            start, before = point, self.noise
+            point = self.search(point, tolerances).x
             for _ in range(NOISE_ROUNDS):
                 last, self.noise = self.noise, self._judged_noise(point)
                 if self._alike(self.noise, last):
                     break
-            if self._alike(self.noise, before):
+            followed = all(d.kind in FILTERS for d in self.task.distortions) or np.abs(point - start).max() < FOLLOWED
+            if self._alike(self.noise, before) and followed:
                 break
         return point
 
@@ -457,6 +511,7 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
         if not low < task.start[name] < high:
             raise UserError(f"{name} starts at {task.start[name]:.6g}, outside of its bounds {low:.6g} to {high:.6g}")
     fitter, first = Fitter(model, experiments, task), task.first()
+    fitter.follow(first)
     point = fitter.settle(fitter.search(first, COARSE).x)
 
     # Other minima, at the noise of the first one.
@@ -492,22 +547,36 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
 
 
 def refitted(
-    solution: Solution, distortions: tuple[Distortion, ...], faults: Sequence[Sequence[Complex]] = ()
+    solution: Solution,
+    distortions: tuple[Distortion, ...] = (),
+    drift: tuple[str, ...] = (),
+    priors: Mapping[str, Prior] = {},
+    tolerances: Mapping[str, float] = COARSE,
 ) -> Solution:
-    """Repeat the fit with further distortions as unknowns, or with faults of each experiment, just accurately enough to
+    """Repeat the fit with further distortions, drifting channels and parameters as unknowns. By default it is just accurate enough to
     compare causes. The fit starts from the solution. If a parameter then differs from its start value by more than a factor of
     e, the fit is repeated from the start values, and the better one counts."""
-    task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
-    starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
+    was = solution.task
+    names = tuple(dict.fromkeys((*was.names, *priors)))
+    task = replace(
+        was,
+        names=names,
+        distortions=(*was.distortions, *distortions),
+        drift=(*was.drift, *drift),
+        priors={**priors, **was.priors},
+    )
+    at = dict(zip(was.unknowns, solution.logarithms.tolist()))
+    first = task.first()
+    starts = [np.array([at.get(name, x) for name, x in zip(task.unknowns, first)]), first]
     found = []
     for start_point in starts:
-        fitter = Fitter(
-            solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
-        )
-        point = fitter.settle(fitter.search(start_point, COARSE).x, FEW_ROUNDS, COARSE)
+        fitter = Fitter(solution.fitter.model, solution.fitter.experiments, task, solution.noise)
+        fitter.follow(start_point)
+        rounds = FEW_ROUNDS if tolerances is COARSE else ROUNDS
+        point = fitter.settle(fitter.search(start_point, COARSE).x, rounds, tolerances)
         misfit = float(np.sum(fitter.residuals(point) ** 2))
-        found.append(_solution(fitter, point, misfit, [], 1))
-        if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
+        found.append(_solution(fitter, point, misfit, [], solution.tried))
+        if np.abs(point[: len(names)] - first[: len(names)]).max() < 1:
             break
     return min(found, key=lambda each: each.deviance)
 

@@ -36,8 +36,8 @@ CLOSE = 1.0
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page(found: Findings) -> str:
-    """The page as HTML."""
+def page(found: Findings, *, command: bool = False) -> str:
+    """The page as HTML. command: whether remedies are options of the command instead of arguments of Python."""
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -47,7 +47,8 @@ def page(found: Findings) -> str:
         sure=found.sure,
         solution=found.solution,
         estimates=found.parameters,
-        notes=found.notes_in(shown=True),
+        diagnosis=found.diagnosis_in(command=command),
+        notes=found.notes,
         rounded=rounded,
         channels=[_shown(channel) for channel in found.channels],
         figures=figures(found),

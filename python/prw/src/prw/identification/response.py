@@ -20,35 +20,33 @@ import numpy as np
 from scipy.linalg import expm
 
 from prw.identification.experiment import Experiment
+from prw.identification.kinds import FILTERS, KINDS
 from prw.motion import Array
 from prw.state_space import Complex, StateSpace
 from prw.testbed import OUTPUTS
 
-#: The distortions of a channel, in the order of `identify`'s arguments, each with a unit in which 1 is a typical size. A gain
-#: is estimated as its logarithm.
-DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
-#: Bounds of a distortion in these units.
+#: Bounds of a distortion in units of its scale.
 FURTHEST = 50.0
 
 
 class Distortion(NamedTuple):
-    """A distortion between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
+    """What distinguishes a rig or its record from the FMU: a kind of KINDS at a place."""
 
     kind: str
     channel: str
 
     def __str__(self) -> str:
-        return f"{self.kind} of {self.channel}"
+        return KINDS[self.kind].places.get(self.channel) or f"{self.kind} of {self.channel}"
 
     def value(self, x: float) -> float:
-        """The delay or lag in s, or the gain, from the unknown x."""
-        return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
+        """The size in SI from the unknown x."""
+        return float(np.exp(x)) if self.kind == "gain" else x * KINDS[self.kind].scale
 
     def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
-        """Frequency response (f,) and the derivative of its logarithm with respect to x."""
+        """Frequency response (f,) of a filter, and the derivative of its logarithm with respect to x."""
         if self.kind == "gain":
             return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
-        s = s * DISTORTIONS[self.kind]
+        s = s * KINDS[self.kind].scale
         if self.kind == "delay":
             return np.exp(-s * x), -s
         return 1 / (1 + s * x), -s / (1 + s * x)
@@ -96,8 +94,16 @@ def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...
 class Response:
     """Response of a model to the motors of an experiment, at its first `bins` frequencies (f)."""
 
-    def __init__(self, model: Discrete, experiment: Experiment, bins: int, distortions: Mapping[Distortion, float]):
-        """distortions: the unknown of each; channels that the experiment does not contain are ignored."""
+    def __init__(
+        self,
+        model: Discrete,
+        experiment: Experiment,
+        bins: int,
+        distortions: Mapping[Distortion, float],
+        effects: Mapping[Distortion, Complex] = {},
+    ):
+        """distortions: the unknown of each; channels that the experiment does not contain are ignored. effects: spectra (f, c) that
+        are added to the outputs per unit of a distortion's size, see `effects`."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
@@ -120,20 +126,30 @@ class Response:
         self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
         self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
         for k, (distortion, x) in enumerate(distortions.items()):
-            if distortion.channel in experiment.channels:
+            if distortion.kind in FILTERS and distortion.channel in experiment.channels:
                 channel = experiment.channels.index(distortion.channel)
                 through, self._growths[k, :, channel] = distortion.response(x, self._s)
                 self._filters[:, channel] *= through
+        self._added: Complex = np.zeros((len(distortions), *self.outputs.shape), dtype=complex)
+        for k, distortion in enumerate(distortions):
+            if distortion in effects:
+                self._added[k] = KINDS[distortion.kind].scale * effects[distortion][:bins]
         self.outputs *= self._filters
+        self.outputs += np.tensordot(list(distortions.values()), self._added, 1) if distortions else 0.0
         self.transients *= self._filters[..., None]
         self.transfer *= self._filters[..., None]
 
-    def moving(self, d: Array) -> tuple[Complex, Complex]:
-        """Spectra of the states (f, 6) with transients `d` (6,), and the transfer to the channels (f, c, 6) from
-        increments of the states in every step."""
-        steps: Complex = np.asarray(self.model.C @ self._resolvent, dtype=np.complex128)
-        through = self._filters[..., None] * steps
-        return self._with(d)[..., 0], through
+    def moving(self, d: Array) -> Complex:
+        """Spectra of the states (f, 6) with transients `d` (6,)."""
+        return self._with(d)[..., 0]
+
+    def driven(self, increments: Complex, direct: Complex) -> Complex:
+        """Spectra of the channels (f, c) for increments of the states in every step, and direct changes of the channels, whose spectra
+        are (all_bins, 6) and (all_bins, c)."""
+        bins = len(self._states)
+        moved = self.model.C @ (self._resolvent @ increments[:bins, :, None])
+        driven: Complex = self._filters * (moved[..., 0] + direct[:bins])
+        return driven
 
     def _with(self, d: Array) -> Complex:
         """The states, with transients `d` (6,) for the motors' motion."""
@@ -162,5 +178,5 @@ class Response:
         outputs, transfer = table[..., 0], table[..., 1:]
         there: Complex = self.outputs + self.transients @ d
         more: Complex = self._growths[..., None] * self.transfer
-        wider: Complex = np.concatenate([outputs, self._growths * there])
+        wider: Complex = np.concatenate([outputs, self._growths * there + self._added])
         return wider, np.concatenate([transfer, more])

@@ -25,45 +25,49 @@ class Identification(Findings):
         The FMU's parameters.
     solution, sure
         The fit and its statistics.
-    verdict
-        Whether the model explains the data.
-    diagnosis
-        Possible causes if the model does not explain the data.
+    explanation
+        The verdict, and possible causes if the model alone does not explain the data.
+    parts
+        Fits of parts of the recordings, if only these fit because a parameter changes over time.
     advice
         Experiments that would determine undetermined combinations.
     """
 
-    def summary(self, *, shown: bool = False) -> str:
-        """The result in a few lines, in SI; if `shown` is true, parameters are in display units."""
+    def summary(self, *, command: bool = False) -> str:
+        """The result in a few lines, in SI. command: whether remedies are options of `prw identify` instead of arguments."""
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
         if self.fits:
-            lines.append("verdict     the FMU explains the data")
+            lines.append(
+                "verdict     the FMU explains the data"
+                + f", together with {' and '.join(self.additions)}" * bool(self.additions)
+            )
         else:
             lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not reliable")
             lines += [f"  {misfit}" for misfit in self.misfits]
-            lines += [f"perhaps     {cause}" for cause in self.diagnosis or ["no known cause"]]
+            lines += [f"perhaps     {cause}" for cause in self.diagnosis_in(command=command) or [self.unknown_cause]]
         for name, found in self.parameters.items():
-            factor, unit = self._unit(name, shown)
-            estimate, _, low, high = found.rounded(factor)
+            estimate, _, low, high = found.rounded()
             sureness = f"+- {found.relative:.2%}   95 % interval {low} to {high}"
             sureness = "not determined" if found.hopeless else sureness
-            lines.append(f"  {name:<9} {estimate} {unit}  {sureness}{', prior' if found.prior else ''}")
+            lines.append(f"  {name:<9} {estimate} {found.unit}  {sureness}{', prior' if found.prior else ''}")
         for name, (value, error) in self.distortions.items():
-            factor, unit = (1.0, "") if name.startswith("gain") else (1e3, " ms")
-            lines.append(f"  {name}: {' +- '.join(rounded(value * factor, error * factor))}{unit}")
+            kind = self.kind_of(name)
+            size = " +- ".join(rounded(value / kind.factor, error / kind.factor))
+            lines.append(f"  {name}: {size} {kind.unit}".rstrip())
         noise = (f"{name} {value:.2g} {si_unit(name)}" for name, value in self.solution.noise.items())
         lines.append("noise       " + ", ".join(noise))
-        return "\n".join([*lines, *(f"note        {note}" for note in self.notes_in(shown=shown))])
+        return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
-    def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, an HTML page that loads no other file: verdict, estimates, notes, residuals. Raises UserError without
-        jinja2 or matplotlib, or if the file cannot be written."""
+    def report(self, path: str | os.PathLike[str], *, command: bool = False) -> None:
+        """Write the report, an HTML page that loads no other file: verdict, estimates, notes, residuals. command: whether remedies are
+        options of `prw identify` instead of arguments. Raises UserError without jinja2 or matplotlib, or if the file cannot be
+        written."""
         need("jinja2", "matplotlib")
         from prw.identification.report import page
 
-        write_text(path, page(self))
+        write_text(path, page(self, command=command))
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """All numbers as JSON, also written to `path` if it is given."""
@@ -120,11 +124,18 @@ class Identification(Findings):
                 "fits": self.fits,
                 "misfits": [misfit._asdict() for misfit in self.verdict.misfits],
                 "diagnosis": list(self.diagnosis),
-                "tried": [
-                    {"fault": f.name, "unit": f.unit, "size": f.size, "standard_error": f.error}
-                    for f in self.verdict.faults
-                ],
+                "additions": self.additions,
+                "tried": [{"fault": f.name, "size": f.size, "standard_error": f.error} for f in self.verdict.faults],
+                "fitted": list(self.explanation.tried),
             },
+            "parts": [
+                {
+                    "begin": part.begin,
+                    "end": part.end,
+                    "parameters": {n: part.value(n) for n in part.solution.task.names},
+                }
+                for part in self.parts
+            ],
             "distortions": {n: {"value": v, "standard_error": e} for n, (v, e) in self.distortions.items()},
             "parameters": parameters,
             "correlation": {"names": list(sure.names), "matrix": sure.correlation.tolist()},

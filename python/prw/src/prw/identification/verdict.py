@@ -1,9 +1,9 @@
 """Tests whether the model explains the data, and whether a fault would explain them.
 
-The residuals of a correct fit are noise, which three tests check. Local regression over frequency
+The residuals of a correct fit are noise, which four tests check. Local regression over frequency
 finds residuals that are coherent with the motors' spectra or the channel's own. Score tests (Rao, Proc. Cambridge Phil.
-Soc. 44 (1948) 50) find the effects of single faults: a delay, a lag or a gain of one channel or of several, friction,
-backlash. The third test compares the residuals' strength with the noise at frequencies at which the motors do not move.
+Soc. 44 (1948) 50) find the effects of single hypotheses, such as a delay of a channel or friction. The third test compares the
+residuals' strength with the noise above the frequencies at which the motors move, and the fourth with the channel's motion.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import fdtrc
 
-from prw.identification.experiment import Experiment, spectra
-from prw.identification.fit import Comparison, Solution
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Comparison, Solution, slow
+from prw.identification.kinds import FILTERS, KINDS
 from prw.identification.response import Distortion
 from prw.identification.statistics import MARGIN, covariance_of, information_of
 from prw.motion import Array
 from prw.state_space import Complex
-from prw.testbed import OUTPUTS
 
 #: Probability below which a coherence with the motion is a misfit. It is small, because the steps of encoders are not normally
 #: distributed: in slow motion, probabilities of 1e-8 occur in correct fits.
 CHANCE = 1e-10
-#: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, and above SMALL it widens
-#: intervals. Friction always widens them, because every bearing has some.
-CLEAR, SMALL = 4.7, 2.5
+#: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, above NOTED a note names it, and above
+#: SMALL it widens intervals. Friction always widens them, because every bearing has some.
+CLEAR, NOTED, SMALL = 4.7, 4.0, 2.5
 #: CLEAR for faults that follow the sign of a rate. It is larger, because in a periodic motion the steps of encoders
 #: also follow that sign.
 CLEAR_SIGN = 7.0
@@ -40,28 +40,59 @@ PIECE, MAX_PIECES = 16, 6
 CLEARLY_MOVING = 30.0
 #: A direction is left out if less than this share of it is independent of the others.
 NEW = 0.02
-#: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
-TURNING = 0.02
+#: A channel is not explained if less than this share of its motion is, and the residual is more than FAR times the noise.
+EXPLAINED, FAR = 0.5, 3.0
 
 
 #: Pairs of channels, which often share an amplifier or converter.
 PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
 
 
-def groups(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[tuple[str, ...]]:
-    """Groups of channels (default: all) that may share a fault of a kind and have no distortion of this kind yet:
-    single channels, pairs and, except for gains, all together."""
-    channels, known = channels or solution.fitter.channels, set(solution.task.distortions)
-    found: list[tuple[str, ...]] = [(name,) for name in channels]
-    found += [pair for pair in PAIRS if set(pair) <= set(channels)]
-    if len(channels) > 2 and kind != "gain":
-        found.append(tuple(channels))
-    return [group for group in found if not {Distortion(kind, name) for name in group} & known]
+class Hypothesis(NamedTuple):
+    """What may distinguish the rig or its record from the FMU: a kind of KINDS or a drift, at one or more places."""
+
+    kind: str
+    places: tuple[str, ...]
+
+    def __str__(self) -> str:
+        if self.kind in KINDS and KINDS[self.kind].places:
+            return " and ".join(map(str, self.distortions))
+        return f"{self.kind} of {' and '.join(self.places) if len(self.places) < 3 else 'all channels'}"
+
+    @property
+    def distortions(self) -> tuple[Distortion, ...]:
+        """The distortions of the hypothesis; none for a drift."""
+        return tuple(Distortion(self.kind, place) for place in self.places if self.kind in KINDS)
+
+    @property
+    def unit(self) -> str:
+        """Unit of its size in messages."""
+        return KINDS[self.kind].unit if self.kind in KINDS else ""
+
+    @property
+    def signs(self) -> bool:
+        """Whether it follows the sign of a rate or a twist, and is never negative."""
+        return self.kind in ("friction", "backlash")
+
+    @property
+    def belongs(self) -> bool:
+        """Whether it is a property of the rig, with which the data may be explained."""
+        return self.kind == "drift" or (self.kind in KINDS and KINDS[self.kind].belongs)
 
 
-def named(kind: str, group: Sequence[str]) -> str:
-    """The name of a fault that channels share."""
-    return f"{kind} of {' and '.join(group) if len(group) < 3 else 'all channels'}"
+def hypotheses(solution: Solution, kind: str, channels: Sequence[str] = ()) -> list[Hypothesis]:
+    """The hypotheses of a kind that the fit does not contain yet. Filters may apply to single channels (default: all), to pairs and,
+    except for gains, to all together; a drift to single channels."""
+    task, channels = solution.task, channels or solution.fitter.channels
+    if kind == "drift":
+        return [Hypothesis(kind, (name,)) for name in channels if name not in task.drift]
+    places: list[tuple[str, ...]] = [(place,) for place in KINDS[kind].places] or [(name,) for name in channels]
+    if kind in FILTERS:
+        places += [pair for pair in PAIRS if set(pair) <= set(channels)]
+        if len(channels) > 2 and kind != "gain":
+            places.append(tuple(channels))
+    found = [Hypothesis(kind, group) for group in places]
+    return [each for each in found if not set(each.distortions) & set(task.distortions)]
 
 
 class Fault(NamedTuple):
@@ -69,12 +100,10 @@ class Fault(NamedTuple):
 
     Attributes
     ----------
-    name
-        Name of the fault.
-    unit
-        Unit of its size.
+    hypothesis
+        What it is.
     size, error
-        Size, estimated together with the parameters, and its standard error.
+        Size in SI, a gain as its logarithm, estimated together with the parameters; and its standard error.
     shift
         (p,), change of the unknowns that the fault would cause.
     per_error
@@ -83,8 +112,7 @@ class Fault(NamedTuple):
         Rise of twice the log likelihood if the fault is included.
     """
 
-    name: str
-    unit: str
+    hypothesis: Hypothesis
     size: float
     error: float
     shift: Array
@@ -92,9 +120,14 @@ class Fault(NamedTuple):
     gain: float
 
     @property
+    def name(self) -> str:
+        """Name of the fault."""
+        return str(self.hypothesis)
+
+    @property
     def signs(self) -> bool:
-        """Whether the fault follows the sign of a rate."""
-        return self.name.startswith(("friction", "backlash"))
+        """Whether the fault follows the sign of a rate or a twist."""
+        return self.hypothesis.signs
 
     @property
     def clear(self) -> float:
@@ -162,7 +195,7 @@ class Verdict(NamedTuple):
     @property
     def suggested(self) -> Fault | None:
         """The most significant fault, if it is unlikely to be chance."""
-        return next((fault for fault in self.faults if fault.clear > SMALL), None)
+        return next((fault for fault in self.faults if fault.clear > NOTED), None)
 
     @property
     def fits(self) -> bool:
@@ -175,12 +208,15 @@ def judge(solution: Solution) -> Verdict:
     inverse = covariance_of(solution.task.prior_information() + information_of(solution.jacobians))
     misfits: list[Misfit] = []
     faults: list[Fault] = []
+    additions = [each for kind, described in KINDS.items() if described.places for each in hypotheses(solution, kind)]
+    effects = solution.fitter.effects(solution.logarithms, [d for each in additions for d in each.distortions])
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
 
         def score(columns: Complex, i: int = i, comparison: Comparison = comparison) -> _Score:
             return _Score(solution, i, comparison.change_along(columns), inverse)
 
         spread, luck = _strength(solution, i)
+        explained = _unexplained(solution, i)
         for j, name in enumerate(experiment.channels):
             there = score(_following(experiment, comparison, j))
             chance = there.chance(2 * experiment.bins)
@@ -189,27 +225,59 @@ def judge(solution: Solution) -> Verdict:
                 reasons.append("the unexplained part follows the motors")
             if spread[j] > EXCESS * (1 + LUCK * luck[j]):
                 reasons.append(
-                    f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
+                    f"the residual is {float(f'{spread[j]:.2g}'):g} times as strong as at higher frequencies, where the motors do not "
+                    "move and only noise remains"
                 )
+            if explained[j]:
+                reasons.append("the residual is about as large as the motion")
             if reasons:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(reasons)))
-        for name, unit, column in single_faults(solution, experiment, comparison):
-            fault = score(column[None]).fault(name, unit)
+        found = [(each, effects[i][d]) for each in additions for d in each.distortions if effects[i][d].any()]
+        for hypothesis, column in [*_rows(solution, i), *found]:
+            fault = score(column[None, : experiment.needed_bins]).fault(hypothesis)
             if fault is not None:
                 faults.append(fault)
     widening = np.zeros(len(inverse))
     for fault in faults:
-        if fault.name.startswith("friction") or fault.clear > SMALL:
+        if fault.hypothesis.kind == "friction" or fault.clear > SMALL:
             widening = np.maximum(widening, fault.bias)
+    gain, count = common_gain(solution), len(solution.task.names)
+    widening[:count] = np.hypot(widening[:count], abs(gain))
     faults = sorted((fault for fault in faults if fault.possible), key=lambda fault: -fault.clear)
     clear = [fault for fault in faults if fault.clear > (CLEAR_SIGN if fault.signs else CLEAR)]
     if clear and not misfits:
         fault = clear[0]
         e = solution.fitter.experiments[0]
-        description = f"{fault.name} of {fault.size:.3g} +- {fault.error:.1g} {fault.unit}".rstrip()
-        for channel in [name for name in e.channels if name in fault.name.split()] or ["all"]:
-            misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{description} would explain more of the data"))
+        kind, places = fault.hypothesis
+        factor = KINDS[kind].factor if kind in KINDS else 1.0
+        sized = f"{fault.size / factor:.3g} +- {fault.error / factor:.1g} {fault.hypothesis.unit}".rstrip()
+        for channel in [name for name in e.channels if name in places] or ["all"]:
+            misfits.append(
+                Misfit(e.name, channel, 0.0, e.band, f"{fault.name} of {sized} would explain more of the data")
+            )
     return Verdict(tuple(misfits), tuple(faults), widening)
+
+
+def common_gain(solution: Solution) -> float:
+    """Mean logarithm of the gains of all torque channels, if they are estimated but the inertias are not, else 0. Such a gain looks like
+    inertias that are wrong by the same factor, with which all stiffness and damping would differ by that factor, too."""
+    unknowns, torques = solution.task.unknowns, [n for n in solution.fitter.channels if n.startswith("tau")]
+    gains = [str(Distortion("gain", name)) for name in torques]
+    if not torques or not set(gains) <= set(unknowns) or {"J2", "J3", "H3"} & set(unknowns):
+        return 0.0
+    return float(np.mean([solution.logarithms[unknowns.index(name)] for name in gains]))
+
+
+def _unexplained(solution: Solution, i: int) -> list[bool]:
+    """Whether the residual of each channel (c) is so large that the model hardly explains the channel."""
+    values, found = solution.fitter.experiments[i].values, []
+    assert values is not None
+    for j, name in enumerate(solution.fitter.experiments[i].channels):
+        quantum = float(np.mean(solution.fitter.experiments[i].channel_power[:, j]))
+        rms = float(np.sqrt(np.nanmean((values[:, j] - solution.modelled[i][:, j]) ** 2)))
+        far = rms > FAR * np.sqrt(solution.noise[name] ** 2 + quantum)
+        found.append(bool(far and rms > (1 - EXPLAINED) * np.nanstd(values[:, j])))
+    return found
 
 
 class _Score:
@@ -250,7 +318,7 @@ class _Score:
         left = max(count - ratio, 0.02 * count) / max(count - k, 1)
         return float(fdtrc(k, max(count - k, 1), ratio / k / left))
 
-    def fault(self, name: str, unit: str) -> Fault | None:
+    def fault(self, hypothesis: Hypothesis) -> Fault | None:
         """The fault along the only direction; None if the parameters explain it as well."""
         left = float(self._information[0, 0])
         if left < max(1e-6, MARGIN * float(self._noise[0, 0])):
@@ -264,7 +332,7 @@ class _Score:
             2 * self._residual.shape[1] * float(np.sum(np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))))
         )
         shift = self._shift[:, 0]
-        return Fault(name, unit, -size / scale, error / scale, shift * size, np.abs(shift) * error, gain)
+        return Fault(hypothesis, -size / scale, error / scale, shift * size, np.abs(shift) * error, gain)
 
 
 def _following(experiment: Experiment, comparison: Comparison, j: int) -> Complex:
@@ -286,61 +354,24 @@ def _following(experiment: Experiment, comparison: Comparison, j: int) -> Comple
     return np.concatenate(columns)
 
 
-def single_faults(
-    solution: Solution, experiment: Experiment, comparison: Comparison
-) -> Iterator[tuple[str, str, Complex]]:
-    """Single faults: name, unit, and contribution to the channels (f, c) per unit."""
+def _rows(solution: Solution, i: int) -> Iterator[tuple[Hypothesis, Complex]]:
+    """Hypotheses on single channels, with their contribution to the channels (f, c) of experiment i per unit of their size. A drift
+    has several contributions, one after the other."""
+    experiment, comparison = solution.fitter.experiments[i], solution.comparisons[i]
     response, count = comparison.response, experiment.needed_bins
     there = response.outputs + response.transients @ comparison.initial
     s: Complex = 2j * np.pi * np.arange(count, dtype=complex) / (len(experiment.time) * experiment.step)
     # A lag is the same as a delay to first order. A common fault of two channels may have ten standard errors, while each
     # single one has one or two, because the parameters compensate for the latter.
-    for kind, unit in (("delay", "ms"), ("gain", "")):
-        for group in groups(solution, kind, experiment.channels):
-            indices = [experiment.channels.index(name) for name in group]
+    for kind in ("delay", "gain"):
+        for hypothesis in hypotheses(solution, kind, experiment.channels):
+            indices = [experiment.channels.index(name) for name in hypothesis.places]
             column = np.zeros_like(there)
-            column[:, indices] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, indices]
-            yield named(kind, group), unit, column
-    turning = [_sign(experiment.omega[:, i]) for i in (0, 1)]
-    signs = spectra(np.column_stack(turning))[:count]
-    yield "backlash at the motors", "rad", -(response.transfer @ signs[..., None])[..., 0] / 2
-    for i, name in enumerate(("tau1", "tau2")):
-        if name in experiment.channels:
-            column = np.zeros_like(there)
-            column[:, experiment.channels.index(name)] = signs[:, i]
-            yield f"friction at motor {i + 1}", "N.m", column
-    yield from _mechanical_friction(solution, experiment, comparison)
-
-
-def _mechanical_friction(
-    solution: Solution, experiment: Experiment, comparison: Comparison
-) -> Iterator[tuple[str, str, Complex]]:
-    """Dry friction of the output about pitch and roll, of both input shafts, and of each of them, in the form of
-    `single_faults`."""
-    model, known = solution.fitter.model.at(solution.values), solution.values
-    turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
-    inertia = known["J2"] * np.eye(2) + turns.T @ np.diag([known["H3"], known["J3"]]) @ turns
-    states, through = comparison.response.moving(comparison.initial)
-    count = experiment.needed_bins
-
-    def braked(torques: Array) -> Complex:
-        """Contribution of torques (n, 2) N.m against the motion of the input shafts."""
-        accelerations = spectra(torques)[:count] @ np.linalg.inv(inertia)
-        column: Complex = -experiment.step * (through[:, :, 4:] @ accelerations[..., None])[..., 0]
-        return column
-
-    shafts = np.fft.irfft(states[:, 4:], len(experiment.time), axis=0, norm="ortho")
-    output = shafts @ turns.T
-    yield "friction about pitch and roll", "N.m", braked(np.column_stack([_sign(r) for r in output.T]) @ turns)
-    each = np.column_stack([_sign(r) for r in shafts.T])
-    yield "friction in both input shafts", "N.m", braked(each)
-    for i in (0, 1):
-        yield f"friction in input shaft {i + 1}", "N.m", braked(each * np.eye(2)[i])
-
-
-def _sign(rate: Array) -> Array:
-    found: Array = np.tanh(rate / max(TURNING * float(np.abs(rate).max()), 1e-3))
-    return found
+            change = hypothesis.distortions[0].response(0.0, s)[1] / KINDS[kind].scale
+            column[:, indices] = change[:, None] * there[:, indices]
+            yield hypothesis, column
+    for hypothesis in hypotheses(solution, "drift", experiment.channels):
+        yield from ((hypothesis, column) for column in np.moveaxis(slow(experiment, hypothesis.places), 2, 0))
 
 
 def _strength(solution: Solution, i: int) -> tuple[Array, Array]:

@@ -1,0 +1,78 @@
+"""The kinds of distortions: what may distinguish a rig or its record from the FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class Kind(NamedTuple):
+    """A kind of distortion, which is an argument of `identify`.
+
+    Attributes
+    ----------
+    scale
+        Typical size, the unit of the fit's unknown. A gain is estimated as its logarithm.
+    places
+        Where it may be, with the names for messages; without any, the places are the channels.
+    unit, factor
+        Unit for messages, and the factor from it to SI.
+    belongs
+        Whether it is a property of the rig, which the fit may include without a request.
+    """
+
+    scale: float
+    places: Mapping[str, str] = {}
+    unit: str = ""
+    factor: float = 1.0
+    belongs: bool = False
+
+
+#: The kinds of distortions by argument.
+KINDS = {
+    "delay": Kind(1e-3, unit="ms", factor=1e-3),
+    "lag": Kind(1e-3, unit="ms", factor=1e-3),
+    "gain": Kind(1.0),
+    "friction": Kind(
+        1e-2,
+        {
+            "shafts": "friction in both input shafts",
+            "output": "friction about pitch and roll",
+            "shaft1": "friction in input shaft 1",
+            "shaft2": "friction in input shaft 2",
+            "motor1": "friction at motor 1",
+            "motor2": "friction at motor 2",
+        },
+        "N.m",
+        belongs=True,
+    ),
+    "backlash": Kind(
+        1e-3,
+        {
+            "k1": "backlash in the couplings k1",
+            "k2": "backlash in the couplings k2",
+            "motors": "backlash at the motors",
+        },
+        "mrad",
+        1e-3,
+        belongs=True,
+    ),
+    "cubic": Kind(
+        100.0,
+        {"k1": "cubic stiffness of the couplings k1", "k2": "cubic stiffness of the couplings k2"},
+        "rad^-2",
+        belongs=True,
+    ),
+    "crosstalk": Kind(
+        1e-2,
+        {
+            "torques": "crosstalk between tau1 and tau2",
+            "tau1": "crosstalk from tau2 to tau1",
+            "tau2": "crosstalk from tau1 to tau2",
+        },
+        "%",
+        1e-2,
+    ),
+}
+#: Kinds that filter a channel; the others add to the outputs.
+FILTERS = ("delay", "lag", "gain")
