@@ -24,13 +24,18 @@ def library() -> bytes:
         return to.read_bytes()
 
 
-def foreign(directory: Path, manner: str, version: str = "2.0") -> Path:
-    """Packs the FMU with this manner and for this FMI version into the directory, and returns it."""
+def foreign(directory: Path, manner: str, version: str = "2.0", changes: dict[str, str] | None = None) -> Path:
+    """Packs the FMU with this manner and for this FMI version into the directory, and returns it. `changes` are replacements in its
+    model description.
+    """
     fmu = directory / f"{manner}{version[0]}.fmu"
     platform = "linux64" if version == "2.0" else "x86_64-linux"
     with zipfile.ZipFile(fmu, "w") as archive:
         description = (SOURCE / f"foreign{version[0]}.xml").read_text(encoding="utf-8")
-        archive.writestr("modelDescription.xml", description.replace("MANNER", manner))
+        for old, new in {"MANNER": manner, **(changes or {})}.items():
+            assert old in description, old
+            description = description.replace(old, new)
+        archive.writestr("modelDescription.xml", description)
         archive.writestr(f"binaries/{platform}/foreign.so", library())
         archive.writestr("resources/gain.txt", "2.5")
     return fmu

@@ -27,8 +27,8 @@ def made(request, tmp_path):
     """Returns a function that opens the FMU with a manner. Each test runs once for FMI 2.0 and once for FMI 3.0."""
     opened = []
 
-    def make(manner, version=request.param):
-        opened.append(fmu_run.Fmu(foreign(tmp_path, manner, version)))
+    def make(manner, version=request.param, changes=None):
+        opened.append(fmu_run.Fmu(foreign(tmp_path, manner, version, changes)))
         return opened[-1]
 
     yield make
@@ -111,6 +111,25 @@ def test_values_of_formats(made):
     heard = []
     made("format", "2.0").instances(log=lambda *message: heard.append(message[3]))
     assert heard == ["tank has 7 of 8, 0.500 and 1.0e-09, ab  |%|z"]
+
+
+def test_temperatures_and_their_differences(made):
+    kelvin = '<UnitDefinitions><Unit name="K"><DisplayUnit name="degC" offset="-273.15"/></Unit></UnitDefinitions><DefaultExperiment'
+    for relative, expected in (("false", 278.15), ("true", 5.0)):
+        changes = {
+            "<DefaultExperiment": kelvin,
+            'canHandleVariableCommunicationStepSize="true"': 'canInterpolateInputs="true"',
+            '<Real start="0"/>': f'<Real start="0" unit="K" relativeQuantity="{relative}"/>',
+        }
+        fmu = made("plain", "2.0", changes)
+        time, given = [0.0, 1.0, 2.0], (5.0, "degC")
+        for arguments in ({"inputs": {"u": given}}, {"start": {"u": given}}):
+            runs = fmu.run(time, outputs=["u"], **arguments).check()
+            assert runs["u"][0, 0] == pytest.approx(expected)
+        assert fmu.converted("u", 5.0, "degC") == pytest.approx(expected)
+        # The derivative of a temperature has no offset in any case: y = 2 s * 1 s / 2 * 5 K/s.
+        runs = fmu.run(time, inputs={"u": 0.0}, input_derivatives={"u": given}, outputs=["y"]).check()
+        assert runs["y"][0, 2] == pytest.approx(5.0)
 
 
 def test_exact_values(made, tmp_path):

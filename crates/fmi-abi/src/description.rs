@@ -1,7 +1,7 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
 //! standard or stay empty, and each [`Fault`] is listed.
 
-use crate::{BaseType, Interface, Standard, is_c_identifier, shown};
+use crate::{BaseType, Interface, Standard, is_plain_file_name, shown};
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -51,6 +51,9 @@ pub struct Variable {
     pub unit: Option<Arc<str>>,
     /// Display unit of the variable or of its declared type, if given.
     pub display_unit: Option<Arc<str>>,
+    /// Whether the variable or its declared type is a difference of physical quantities (`relativeQuantity`), whose conversion to a
+    /// display unit has no offset (section 2.2.3 of FMI 2.0, 2.4.4 of FMI 3.0).
+    pub is_relative: bool,
     /// Name of the declared type, if given.
     pub declared_type: Option<String>,
     /// Index of the variable of which this variable is the time derivative.
@@ -165,6 +168,8 @@ pub struct Offer {
     pub once_per_process: bool,
     /// Whether the library starts another program, which must be installed.
     pub needs_execution_tool: bool,
+    /// Whether steps of Co-Simulation may have different sizes (`canHandleVariableCommunicationStepSize`).
+    pub variable_step_size: bool,
     /// Whether the FMU accepts input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
     /// Whether the FMU provides directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with a final s).
@@ -184,6 +189,7 @@ impl Offer {
             identifier: attribute_or_empty(node, "modelIdentifier"),
             once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
             needs_execution_tool: is_true("needsExecutionTool"),
+            variable_step_size: is_true("canHandleVariableCommunicationStepSize"),
             input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
             directional_derivatives: is_true("providesDirectionalDerivative")
                 || is_true("providesDirectionalDerivatives"),
@@ -193,14 +199,14 @@ impl Offer {
         }
     }
 
-    /// Fails if the identifier is not an identifier of C, because files and identifiers in programs are named after
-    /// it. A missing identifier passes, because it is listed as a fault.
+    /// Fails if the identifier is not safe as the name of a file, because the library is named after it. A library can be loaded even
+    /// if the identifier is not an identifier of C, as FMI requires. A missing identifier passes, because it is listed as a fault.
     fn check(&self) -> Result<(), String> {
-        if self.identifier.is_empty() || is_c_identifier(&self.identifier) {
+        if self.identifier.is_empty() || is_plain_file_name(&self.identifier) {
             return Ok(());
         }
         Err(format!(
-            "modelDescription.xml: modelIdentifier \"{}\" is not an identifier of C (letters, digits and _, not beginning with a digit)",
+            "modelDescription.xml: modelIdentifier \"{}\" is not the name of a library, such as Model_1",
             shown(&self.identifier)
         ))
     }
@@ -280,7 +286,7 @@ impl ModelDescription {
     ///
     /// # Errors
     /// Fails if the string is not well-formed XML or would take too much memory or time, if the FMI version is not
-    /// supported, and if `modelIdentifier` is not an identifier of C. The message names the reason.
+    /// supported, and if `modelIdentifier` is not safe as the name of a file. The message names the reason.
     pub fn parse(xml: &str) -> Result<Self, String> {
         Self::parse_configured(xml, &HashMap::new())
     }
@@ -542,6 +548,7 @@ fn variable(
         nominal: limit("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
         unit: shared("unit", |of| of.unit.clone()),
         display_unit: shared("displayUnit", |of| of.display_unit.clone()),
+        is_relative: matches!(of_both("relativeQuantity"), Some("true" | "1")),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
         clocked: node.attribute("clocks").is_some(),

@@ -53,7 +53,7 @@ impl Category {
     /// Returns the category of messages with this status.
     pub const fn of(status: Status) -> Self {
         match status {
-            Status::Ok => Self::Events,
+            Status::Ok | Status::Pending => Self::Events,
             Status::Warning => Self::Warning,
             Status::Discard => Self::Discard,
             Status::Error => Self::Error,

@@ -3,8 +3,6 @@
 use crate::c_types::c_int;
 
 /// Status that a call returns (section 2.1.3 of FMI 2.0).
-///
-/// `Pending` is omitted, because no function of fmu-export is asynchronous.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum Status {
@@ -19,11 +17,12 @@ pub enum Status {
     Error = 3,
     /// The instance cannot be used any more.
     Fatal = 4,
+    /// A step is performed asynchronously (FMI 2.0). No function of fmu-export returns it.
+    Pending = 5,
 }
 
 impl Status {
-    /// Converts the status of a third-party library. An unknown value becomes `Error`. So does `fmi2Pending`, which
-    /// callers that wait for asynchronous steps must handle before.
+    /// Converts the status of a third-party library. An unknown value becomes `Error`.
     #[inline]
     pub const fn from_c(code: c_int) -> Self {
         match code {
@@ -31,6 +30,7 @@ impl Status {
             1 => Self::Warning,
             2 => Self::Discard,
             4 => Self::Fatal,
+            5 => Self::Pending,
             _ => Self::Error,
         }
     }
@@ -41,9 +41,10 @@ mod tests {
     use super::Status;
 
     #[test]
-    fn other_numbers_and_pending_are_errors() {
-        let known = [Status::Ok, Status::Warning, Status::Discard, Status::Error, Status::Fatal];
-        assert_eq!([0, 1, 2, 3, 4].map(Status::from_c), known);
-        assert_eq!([-1, 5, 6].map(Status::from_c), [Status::Error; 3]);
+    fn other_numbers_are_errors() {
+        let known =
+            [Status::Ok, Status::Warning, Status::Discard, Status::Error, Status::Fatal, Status::Pending];
+        assert_eq!([0, 1, 2, 3, 4, 5].map(Status::from_c), known);
+        assert_eq!([-1, 6].map(Status::from_c), [Status::Error; 2]);
     }
 }

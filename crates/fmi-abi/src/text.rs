@@ -52,9 +52,17 @@ pub fn is_c_identifier(text: &str) -> bool {
         && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
 }
 
+/// Returns whether a string is safe as the name of a file in any directory: it contains only letters, digits, spaces and `_-+.`, and
+/// begins with a letter, a digit or `_`. So it is neither a path nor an option of a program.
+pub fn is_plain_file_name(text: &str) -> bool {
+    let is_first = |letter: char| letter.is_alphanumeric() || letter == '_';
+    text.chars().next().is_some_and(is_first)
+        && text.chars().all(|letter| is_first(letter) || " -+.".contains(letter))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{is_c_identifier, one_line, shown};
+    use super::{is_c_identifier, is_plain_file_name, one_line, shown};
 
     #[test]
     fn characters_that_a_terminal_interprets_are_escaped() {
@@ -71,6 +79,12 @@ mod tests {
             !["", "1a", "a.b", "a-b", "a\n", "\u{e4}", "a();system(\"x\")", "../a"]
                 .into_iter()
                 .any(is_c_identifier)
+        );
+        assert!(["a", "a-b", "2.Model 1", "\u{e4}"].into_iter().all(is_plain_file_name));
+        assert!(
+            !["", ".", "../a", "a/b", "a\\b", "c:a", "-a", "a\n", "a;b", "$(a)", "a\"", "a\0", "a\u{202e}b"]
+                .into_iter()
+                .any(is_plain_file_name)
         );
     }
 }

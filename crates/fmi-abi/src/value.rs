@@ -30,7 +30,7 @@ impl Value {
         match base {
             BaseType::Real => string.parse().ok().map(Self::Real),
             BaseType::Float32 => string.parse().ok().map(|value: f32| Self::Real(value.into())),
-            BaseType::Enumeration => string.parse().ok().map(|value: i32| Self::Integer(value.into())),
+            BaseType::Enumeration => string.parse().ok().map(|value: i64| Self::Integer(value.into())),
             BaseType::Boolean => string.parse().ok().map(Self::Boolean),
             BaseType::Binary => bytes(string).map(Self::Binary),
             BaseType::String => Some(Self::String(string.to_owned())),
@@ -105,7 +105,7 @@ mod tests {
             (BaseType::Float32, Value::Real(f64::from(0.1_f32))),
             (BaseType::Int8, Value::Integer(-128)),
             (BaseType::UInt64, Value::Integer(u64::MAX.into())),
-            (BaseType::Enumeration, Value::Integer(7)),
+            (BaseType::Enumeration, Value::Integer(5_000_000_000)),
             (BaseType::Boolean, Value::Boolean(true)),
             (BaseType::String, Value::String("a \"b\"\n".to_owned())),
             (BaseType::Binary, Value::Binary(vec![0, 0x7f, 0xff])),

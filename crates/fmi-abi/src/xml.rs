@@ -25,8 +25,12 @@ pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
     let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();
     reserve(bytes).map_err(|why| format!("{name} cannot be read: {why}"))?;
     scan(text).map_err(|why| format!("{name} {why}"))?;
-    Document::parse(text)
-        .map_err(|error| format!("{name} is not well-formed XML: {}", crate::shown(&error.to_string())))
+    Document::parse(text).map_err(|error| match error {
+        roxmltree::Error::DtdDetected => {
+            format!("{name} has a document type definition (<!DOCTYPE>), which is not read here; remove it")
+        }
+        error => format!("{name} is not well-formed XML: {}", crate::shown(&error.to_string())),
+    })
 }
 
 /// Checks that this number of bytes can be allocated. A collection that grows ends the process if memory runs out, so
@@ -144,7 +148,7 @@ mod tests {
             (format!("<a{attributes}/>"), "F has elements with too many attributes"),
             ("<a>".repeat(10_000), "F has elements that are nested more than 250 deep"),
             (many(1000), "F has elements with too many attributes or namespaces"),
-            ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".to_owned(), "F is not well-formed XML"),
+            ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".to_owned(), "F has a document type definition"),
             ("<a>\u{1b}[31m</a>".to_owned(), "F is not well-formed XML"),
             (String::new(), "F is not well-formed XML"),
         ] {

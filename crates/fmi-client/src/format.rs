@@ -8,7 +8,7 @@
 
 use std::ffi::{CStr, CString};
 
-/// Without a precision, a string argument of this many bytes or more is not expanded.
+/// Without a precision, a string argument is cut after this many bytes.
 const LONGEST: usize = 1 << 16;
 
 /// Arguments of a variadic call that have not been used yet.
@@ -187,8 +187,17 @@ fn string_at(address: usize, limit: usize) -> Option<String> {
         }
     }
     let is_text = |text: &String| !text.chars().any(|char| char.is_control() && !"\t\r\n".contains(char));
+    let is_cut = found.len() >= LONGEST;
+    if is_cut {
+        // The last character may be incomplete.
+        let valid = found.utf8_chunks().next().map_or(0, |chunk| chunk.valid().len());
+        if found.len() - valid < 4 {
+            found.truncate(valid);
+        }
+    }
     // If the caller passed no argument, the address is arbitrary, and may point to data that is not text.
-    if found.len() >= LONGEST { None } else { String::from_utf8(found).ok().filter(is_text) }
+    let text = String::from_utf8(found).ok().filter(is_text)?;
+    Some(if is_cut { format!("{text}... (cut after {LONGEST} bytes)") } else { text })
 }
 
 /// Returns `None`, so that `%s` stays in the text.
@@ -199,7 +208,7 @@ fn string_at(_address: usize, _limit: usize) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::Arguments;
+    use super::{Arguments, LONGEST};
 
     fn expand(format: &str, words: &[usize], numbers: &[f64]) -> String {
         let (mut all, mut reals) = ([0; 8], [0.0; 8]);
@@ -230,6 +239,9 @@ mod tests {
     fn strings_are_read_if_they_exist() {
         let tank = c"tank".as_ptr().addr();
         assert_eq!(expand("%s|%6s|%-6s|%.2s", &[tank; 4], &[]), "tank|  tank|tank  |ta");
+        let long = std::ffi::CString::new("\u{e4}".repeat(LONGEST)).unwrap();
+        let cut = expand("<%s>", &[long.as_ptr().addr()], &[]);
+        assert_eq!(cut, format!("<{}... (cut after 65536 bytes)>", "\u{e4}".repeat(LONGEST / 2)));
         for wrong in [0, 1, 0x1000, usize::MAX - 1, usize::MAX / 2] {
             assert_eq!(expand("the %s is %n empty", &[wrong, wrong], &[]), "the %s is %n empty");
         }

@@ -3,7 +3,7 @@
 
 use crate::float::keeping_environment;
 use crate::library::{Functions, Library};
-use crate::log::{Log, LogListener, callbacks, log_of_fmi3};
+use crate::log::{Log, LogListener, VariableNames, callbacks, log_of_fmi3};
 use crate::rejection::{Message, Rejection};
 use crate::saved::States;
 use fmi_abi::c_types::{c_int, c_void};
@@ -37,6 +37,8 @@ pub struct Settings<'a> {
     pub early_return: bool,
     /// Receiver of all messages, and the number that identifies this instance to it.
     pub listener: Option<(Arc<dyn LogListener>, usize)>,
+    /// Names of the variables, which replace references to them in messages of FMI 2.0.
+    pub names: Option<Arc<dyn VariableNames>>,
 }
 
 impl Settings<'_> {
@@ -52,6 +54,7 @@ impl Settings<'_> {
             event_mode: false,
             early_return: false,
             listener: None,
+            names: None,
         }
     }
 }
@@ -109,7 +112,7 @@ pub enum Continuous {
 const MOST_ITERATIONS: usize = 10_000;
 
 /// `fmi2Pending`: the step is performed asynchronously.
-const PENDING: c_int = 5;
+const PENDING: c_int = Status::Pending as c_int;
 
 // SAFETY: the FMI standards permit use of an instance from any thread, one thread at a time.
 unsafe impl Send for Instance {}
@@ -169,7 +172,7 @@ impl Instance {
     /// The FMU returns NULL. The error contains the FMU's messages.
     pub fn new(library: &Arc<Library>, settings: &Settings) -> Result<Self, Rejection> {
         let Settings { interface, logging_on, event_mode, early_return, .. } = *settings;
-        let log = Log::register(settings.listener.clone());
+        let log = Log::register(settings.listener.clone(), settings.names.clone());
         let environment = log.environment();
         let [own_name, token] =
             [settings.name, settings.token].map(|text| CString::new(text).unwrap_or_default());
@@ -464,7 +467,7 @@ impl Instance {
         };
         match self.check(function, code) {
             Ok(()) if terminate == fmi3False && (early == fmi3False || self.early_return) => Ok(reached),
-            Ok(()) => Err(self.stopped(terminate != fmi3False, reached)),
+            Ok(()) => Err(self.stopped(terminate != fmi3False, time, reached)),
             Err(rejection) => Err(self.ended(rejection, time)),
         }
     }
@@ -496,7 +499,7 @@ impl Instance {
     /// Returns the error of a step after which the FMU requests the end of the simulation, or of a step that ended early although
     /// this was not allowed (section 4.2.1 of FMI 3.0).
     #[cold]
-    fn stopped(&self, wanted: bool, reached: f64) -> Rejection {
+    fn stopped(&self, wanted: bool, time: f64, reached: f64) -> Rejection {
         let (function, status) = ("fmi3DoStep", Status::Discard);
         let mut log = self.log.take();
         if !wanted {
@@ -504,7 +507,7 @@ impl Instance {
             log.push(Message { status, category: String::new(), text });
         }
         let rejection = self.rejection(function, status, log);
-        if wanted { rejection.at_end(reached) } else { rejection }
+        if wanted { rejection.at_end(if reached.is_finite() { reached } else { time }) } else { rejection }
     }
 
     /// Computes directional derivatives of unknowns for a seed, which has a value for each known (section 2.1.9 of FMI 2.0, 2.2.12 of

@@ -20,6 +20,6 @@ mod values;
 
 pub use instance::{Continuous, Event, Instance, Settings};
 pub use library::{Functions, Library};
-pub use log::{LogListener, callbacks, log_of_fmi3};
+pub use log::{LogListener, VariableNames, callbacks, log_of_fmi3};
 pub use rejection::{Message, Rejection, reason};
 pub use saved::Saved;

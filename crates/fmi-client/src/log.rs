@@ -5,10 +5,10 @@
 //! dereferenced.
 
 use crate::rejection::Message;
-use fmi_abi::Status;
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
+use fmi_abi::{BaseType, Status};
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::CStr;
 use std::fmt;
@@ -23,6 +23,46 @@ pub trait LogListener: Send + Sync {
     fn on_message(&self, number: Option<usize>, message: &Message);
 }
 
+/// Names of variables, for messages that refer to them.
+pub trait VariableNames: Send + Sync {
+    /// Returns the name of the variable of FMI 2.0 with this type and this value reference, if there is one. Integers stand for
+    /// enumerations, too.
+    fn name_of(&self, base: BaseType, reference: u32) -> Option<String>;
+}
+
+/// Replaces references to variables, such as `#r1#`, by their names, and `##` by `#` (section 2.1.5 of FMI 2.0). Any other `#` stays,
+/// because many FMUs do not escape it.
+fn with_names(text: &str, names: Option<&dyn VariableNames>) -> String {
+    let (mut named, mut rest) = (String::with_capacity(text.len()), text);
+    while let Some(at) = rest.find('#') {
+        named.push_str(&rest[..at]);
+        rest = &rest[at + 1..];
+        if let Some(after) = rest.strip_prefix('#') {
+            named.push('#');
+            rest = after;
+        } else if let Some((name, after)) = reference(rest, names) {
+            named.push_str(&name);
+            rest = after;
+        } else {
+            named.push('#');
+        }
+    }
+    named + rest
+}
+
+/// Reads a reference after its first `#`. Returns the name of the variable and the text after the reference.
+fn reference<'t>(text: &'t str, names: Option<&dyn VariableNames>) -> Option<(String, &'t str)> {
+    let (reference, after) = text.split_once('#')?;
+    let base = match reference.chars().next()? {
+        'r' => BaseType::Real,
+        'i' => BaseType::Integer,
+        'b' => BaseType::Boolean,
+        's' => BaseType::String,
+        _ => return None,
+    };
+    Some((names?.name_of(base, reference[1..].parse().ok()?)?, after))
+}
+
 /// Maximum number of stored messages, from which a later error takes its reason. Older ones are dropped.
 const MOST_MESSAGES: usize = 64;
 
@@ -33,6 +73,7 @@ pub(crate) struct Log {
     /// Messages since the last call of [`take`](Self::take), which follows each FMI call that does not return OK.
     new: Mutex<VecDeque<Message>>,
     listener: Option<(Arc<dyn LogListener>, usize)>,
+    names: Option<Arc<dyn VariableNames>>,
 }
 
 impl fmt::Debug for Log {
@@ -54,12 +95,15 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Log {
     /// Creates a log and registers it in the list of living instances.
-    pub fn register(listener: Option<(Arc<dyn LogListener>, usize)>) -> Arc<Self> {
+    pub fn register(
+        listener: Option<(Arc<dyn LogListener>, usize)>,
+        names: Option<Arc<dyn VariableNames>>,
+    ) -> Arc<Self> {
         /// Distance between two environments. They are aligned like the pointers of `malloc`, in case an FMU checks that.
         const SPACING: usize = 16;
         static NEXT: AtomicUsize = AtomicUsize::new(0x1000);
         let environment = NEXT.fetch_add(SPACING, Ordering::Relaxed);
-        let log = Arc::new(Self { environment, new: Mutex::default(), listener });
+        let log = Arc::new(Self { environment, new: Mutex::default(), listener, names });
         LIVING.write().unwrap_or_else(PoisonError::into_inner).insert(environment, Arc::clone(&log));
         log
     }
@@ -105,14 +149,20 @@ fn push_limited<T>(items: &mut VecDeque<T>, item: T) {
 }
 
 /// Stores a message in the log of the instance that has this environment. If the environment is unknown but only one instance is alive,
-/// the message must be from that instance.
-fn store(environment: usize, message: Message) {
+/// the message must be from that instance. In FMI 2.0 (`has_references`), the message may refer to variables.
+fn store(environment: usize, mut message: Message, has_references: bool) {
     let living = LIVING.read().unwrap_or_else(PoisonError::into_inner);
     let only = || living.values().next().filter(|_| living.len() == 1);
     if let Some(log) = living.get(&environment).or_else(only) {
         let log = Arc::clone(log);
         drop(living);
+        if has_references {
+            message.text = with_names(&message.text, log.names.as_deref());
+        }
         return log.add(message);
+    }
+    if has_references {
+        message.text = with_names(&message.text, None);
     }
     let mut listeners: Vec<Arc<dyn LogListener>> = Vec::new();
     for (listener, _) in living.values().filter_map(|log| log.listener.as_ref()) {
@@ -195,7 +245,7 @@ unsafe extern "C" fn log_of_fmi2(
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
     let arguments = crate::format::Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
-    store(environment.addr(), message);
+    store(environment.addr(), message, true);
 }
 
 /// Logger of FMI 2.0 for all other platforms. It does not expand formats, because it cannot read variadic arguments there. The
@@ -208,8 +258,9 @@ unsafe extern "C" fn log_of_fmi2(
     category: fmi2String,
     message: fmi2String,
 ) {
-    // SAFETY: both FMI versions require NULL or NUL-terminated strings.
-    unsafe { log_of_fmi3(environment, status, category, message) }
+    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
+    let [category, text] = [category, message].map(|text| unsafe { string(text) });
+    store(environment.addr(), Message { status: Status::from_c(status), category, text }, true);
 }
 
 /// Logger of FMI 3.0 for instances of this crate.
@@ -224,5 +275,5 @@ pub unsafe extern "C" fn log_of_fmi3(
 ) {
     // SAFETY: the caller guarantees NULL or NUL-terminated strings.
     let [category, text] = [category, message].map(|text| unsafe { string(text) });
-    store(environment.addr(), Message { status: Status::from_c(status), category, text });
+    store(environment.addr(), Message { status: Status::from_c(status), category, text }, false);
 }

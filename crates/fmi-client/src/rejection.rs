@@ -101,6 +101,7 @@ impl std::error::Error for Rejection {}
 /// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last one;
 /// `None` if there are no messages.
 pub fn reason(log: &[Message]) -> Option<&Message> {
-    let severe = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
+    let is_severe = |of: &&Message| matches!(of.status, Status::Discard | Status::Error | Status::Fatal);
+    let severe = log.iter().rev().find(is_severe);
     severe.or(log.last())
 }

@@ -2,8 +2,10 @@
 
 use crate::arrays::{Array, Arrays};
 use crate::index::Index;
+use crate::unit::Unit;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Standard, Value};
+use fmi_client::VariableNames;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -42,6 +44,9 @@ pub struct Attributes {
     pub declared_type: Option<String>,
     /// Display unit of the variable or of its declared type, if given.
     pub display_unit: Option<Arc<str>>,
+    /// Whether the variable is a difference of physical quantities, such as a temperature rise: its conversion to a display unit has
+    /// no offset.
+    pub is_relative: bool,
     /// For an output, the variables on which it depends directly, that is, on their values at the same instant. `None` if they are not
     /// declared; then the output may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Dependencies>,
@@ -58,12 +63,12 @@ impl Deref for Variable {
     }
 }
 
-/// A set of value references, stored as ranges because the elements of an array have consecutive ones.
+/// A set of variables, stored as ranges of keys because the elements of an array have consecutive value references.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Dependencies(Vec<Range<u32>>);
+pub struct Dependencies(Vec<Range<u64>>);
 
 impl Dependencies {
-    fn of(mut ranges: Vec<Range<u32>>) -> Self {
+    fn of(mut ranges: Vec<Range<u64>>) -> Self {
         ranges.sort_unstable_by_key(|range| (range.start, range.end));
         ranges.dedup_by(|next, before| {
             let overlap = next.start <= before.end;
@@ -75,14 +80,15 @@ impl Dependencies {
         Self(ranges)
     }
 
-    /// Returns whether the set contains this value reference.
-    pub fn contains(&self, reference: u32) -> bool {
-        let index = self.0.partition_point(|range| range.end <= reference);
-        self.0.get(index).is_some_and(|range| range.contains(&reference))
+    /// Returns whether the set contains this variable.
+    pub fn contains(&self, variable: &Variable) -> bool {
+        let key = variable.key();
+        let index = self.0.partition_point(|range| range.end <= key);
+        self.0.get(index).is_some_and(|range| range.contains(&key))
     }
 
-    /// Returns the ranges of the value references, in increasing order.
-    pub(crate) fn ranges(&self) -> &[Range<u32>] {
+    /// Returns the ranges of the [keys](Variable::key), in increasing order.
+    pub(crate) fn ranges(&self) -> &[Range<u64>] {
         &self.0
     }
 }
@@ -101,7 +107,7 @@ pub struct Description {
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
     /// For each variable of the file, the range of its entries in `variables`: one entry, or one for each element of an array. The
-    /// range is empty for a clock, or for an array whose size is unknown or too large.
+    /// range is empty for a clock, a clocked variable, or an array whose size is unknown or too large.
     spans: Vec<Range<usize>>,
     /// Structural parameters to which the caller has given values; they are set in Configuration Mode.
     pub(crate) structure: Vec<Structural>,
@@ -200,8 +206,14 @@ impl Description {
         let of = self.written.variables.iter().find(|of| of.name == name)?;
         match (of.base, &of.dimensions) {
             (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
+            _ if of.clocked => Some(
+                "has a value only while its clock ticks, and clocks are not supported here; FMPy reads it",
+            ),
             (_, Some(sizes)) if sizes.is_empty() => None,
             (_, None) if !of.is_too_large => Some("is an array of unknown size"),
+            (_, Some(sizes)) if sizes.contains(&0) => {
+                Some("is an array without elements, because a dimension is 0")
+            }
             _ if self.variable(&format!("{name}[1]")).is_some() => None,
             _ => Some("is an array with too many elements; FMPy sets and reads it"),
         }
@@ -225,7 +237,8 @@ impl Description {
     }
 
     /// Checks that an output may be connected to an input of this or another FMU. Both must have the same [kind](Variable::kind),
-    /// and, if both declare them, the same units and enumeration items.
+    /// and, if both declare them, equal units and enumeration items. Units are equal if their definitions are (section 2.2.2 of FMI
+    /// 2.0, 2.4.3 of FMI 3.0); without definitions, if their names are.
     ///
     /// # Errors
     /// Returns a message that names the difference.
@@ -234,10 +247,18 @@ impl Description {
         if one != other {
             return Err(format!("the output is {one}, the input {other}"));
         }
-        if let (Some(one), Some(other)) = (&output.unit, &input.unit)
-            && one != other
-        {
-            return Err(format!("the output is in {one}, the input in {other}"));
+        if let (Some(one), Some(other)) = (&output.unit, &input.unit) {
+            match (self.unit_of(output), to.unit_of(input)) {
+                (Some(of_one), Some(of_other)) if of_one != of_other && one == other => {
+                    return Err(format!(
+                        "both are in {one}, but the output's is {of_one} and the input's {of_other}"
+                    ));
+                }
+                (Some(of_one), Some(of_other)) if of_one == of_other => {}
+                (Some(_), Some(_)) => return Err(format!("the output is in {one}, the input in {other}")),
+                _ if one != other => return Err(format!("the output is in {one}, the input in {other}")),
+                _ => {}
+            }
         }
         match (self.items(output), to.items(input)) {
             (Some(one), Some(other)) if one != other => {
@@ -245,6 +266,24 @@ impl Description {
             }
             _ => Ok(()),
         }
+    }
+}
+
+impl Description {
+    /// Returns the definition of the unit of a variable, if there is one.
+    pub(crate) fn unit_of(&self, variable: &Variable) -> Option<Unit> {
+        let unit = Unit::of(self.units.get(variable.unit.as_deref()?)?)?;
+        Some(if variable.is_relative { unit.of_difference() } else { unit })
+    }
+}
+
+impl VariableNames for Description {
+    fn name_of(&self, base: BaseType, reference: u32) -> Option<String> {
+        let is_same = |of: &&Declared| {
+            let is_integer = base == BaseType::Integer && of.base == Some(BaseType::Enumeration);
+            of.reference == reference && (of.base == Some(base) || is_integer)
+        };
+        self.written.variables.iter().find(is_same).map(|of| of.name.clone())
     }
 }
 
@@ -259,6 +298,19 @@ impl Variable {
         self.causality == "structuralParameter"
     }
 
+    /// Returns a number that identifies the value of the variable in its FMU. It contains the type, because in FMI 2.0 variables of
+    /// different types may have the same value reference, and only integers and enumerations share them (section 2.2.7 of FMI 2.0).
+    pub(crate) fn key(&self) -> u64 {
+        let kind = match self.kind() {
+            "Real" => 0,
+            "Integer" | "Enumeration" => 1,
+            "Boolean" => 2,
+            "String" => 3,
+            _ => 4,
+        };
+        kind << u32::BITS | u64::from(self.reference)
+    }
+
     /// Returns the type of the variable, as it follows “is” in messages: `a string`, `binary`.
     pub(crate) fn kind_in_words(&self) -> &'static str {
         match self.kind() {
@@ -266,6 +318,7 @@ impl Variable {
             "String" => "a string",
             "Binary" => "binary",
             "Enumeration" => "an enumeration",
+            "Integer" => "an integer",
             _ => "a number",
         }
     }
@@ -285,8 +338,12 @@ impl Variable {
 }
 
 /// Adds the elements of an array to `arrays` and returns their value references. Returns a meaningless range of length 1 for a
-/// scalar, and `None` for a clock or an array whose size is unknown or too large.
+/// scalar, and `None` for a clock or an array whose size is unknown or too large. Also returns `None` for a clocked variable, because it
+/// can be set and read only while its clock is active, and in Initialization Mode (section 2.2.8.3 of FMI 3.0).
 fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
+    if of.clocked {
+        return None;
+    }
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
     match sizes.is_empty() {
         true => Some(0..1),
@@ -306,6 +363,7 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         max: of.max,
         declared_type: of.declared_type.clone(),
         display_unit: of.display_unit.clone(),
+        is_relative: of.is_relative,
         depends_on: None,
         description: of.description.clone(),
     });
@@ -331,17 +389,16 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
 /// Sets `depends_on` of outputs and `derivative_of` of derivatives. `spans` contains the range in `variables` for each variable of
 /// the file.
 fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [Variable]) {
-    let references = |span: &Range<usize>, variables: &[Variable]| match &variables[span.clone()] {
+    let keys = |span: &Range<usize>, variables: &[Variable]| match &variables[span.clone()] {
         [] => None,
-        [first, .., last] => Some(first.reference..last.reference + 1),
-        [one] => Some(one.reference..one.reference.saturating_add(1)),
+        [first, .., last] => Some(first.key()..last.key() + 1),
+        [one] => Some(one.key()..one.key() + 1),
     };
     for unknown in &written.outputs {
         let own = spans[unknown.variable].clone();
         let Some(first) = variables.get(own.start).filter(|_| !own.is_empty()) else { continue };
-        let ranges = |known: &Vec<usize>| {
-            known.iter().filter_map(|known| references(&spans[*known], variables)).collect()
-        };
+        let ranges =
+            |known: &Vec<usize>| known.iter().filter_map(|known| keys(&spans[*known], variables)).collect();
         let depends_on = unknown.dependencies.as_ref().map(ranges).map(Dependencies::of);
         let attributes = Arc::new(Attributes { depends_on, ..(*first.attributes).clone() });
         variables[own].iter_mut().for_each(|output| output.attributes = Arc::clone(&attributes));

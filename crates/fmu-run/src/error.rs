@@ -1,6 +1,7 @@
 //! Errors of an FMU or of a request.
 
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Maximum number of characters of an error message; longer messages are shortened.
 const LONGEST: usize = 1000;
@@ -35,6 +36,16 @@ pub(crate) fn request<T>(message: String) -> Result<T, Error> {
     Err(Error::Request(message))
 }
 
+/// Calls `body` for a run or an instance. If it panics, for example because of an absurd value that an FMU returns, the result is a
+/// message, so that all others can continue. The caller must not rely on what `body` has changed.
+pub(crate) fn caught<T>(body: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(body)).map_err(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown reason");
+        format!("fmu_run itself has failed; please report it with the FMU: {text}")
+    })
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -49,3 +60,15 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::caught;
+
+    #[test]
+    fn a_panic_becomes_a_message() {
+        assert_eq!(caught(|| 1), Ok(1));
+        let beyond = caught(|| [0.0; 0][std::hint::black_box(3)]).unwrap_err();
+        assert!(beyond.contains("please report it") && beyond.contains("index out of bounds"), "{beyond}");
+    }
+}

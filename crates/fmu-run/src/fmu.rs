@@ -7,7 +7,7 @@ use crate::library::Library;
 use crate::platform;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
-use fmi_abi::{Interface, Standard};
+use fmi_abi::{Interface, Standard, shown};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
 use std::path::{Path, PathBuf};
@@ -107,7 +107,10 @@ unsafe fn load(
         return Err(why.to_owned());
     }
     let file = library_of(files.path(), standard, offer)?;
-    let resources = standard.resources(&files.path().join("resources"));
+    let directory = files.path().join("resources");
+    // Section 2.3.1 of FMI 3.0.2 requires NULL if the FMU has no resources. FMUs of FMI 2.0 may read the URI without checking for NULL.
+    let has_resources = standard == Standard::Fmi2 || directory.is_dir();
+    let resources = has_resources.then(|| standard.resources(&directory));
     // SAFETY: the caller guarantees that the library is sound.
     let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(files)) };
     loaded.map(Arc::new).map_err(|error| {
@@ -167,6 +170,15 @@ fn library_of(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pat
             "has only C sources, which must be compiled first; `fmpy compile FMU` of FMPy does it".to_owned()
         );
     }
+    // Names the files in the directories, because a directory for this platform may contain a library with another name.
+    let files = |other: &String| {
+        let entries = std::fs::read_dir(binaries.join(other)).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut names: Vec<_> = names.map(|name| format!("{}/{}", shown(other), shown(&name))).collect();
+        names.sort();
+        names
+    };
+    let others: Vec<_> = others.iter().flat_map(files).collect();
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
     Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", directories[0]))
 }

@@ -8,7 +8,7 @@ use crate::library::Library;
 use crate::messages::Logging;
 use fmi_abi::Interface;
 use fmi_abi::description::ModelDescription;
-use fmi_client::{Rejection, Settings};
+use fmi_client::{Rejection, Settings, VariableNames};
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
@@ -31,6 +31,18 @@ pub(crate) struct Experiment {
     pub start_time: f64,
     pub stop_time: Option<f64>,
     pub tolerance: Tolerance,
+}
+
+/// Fails if the size of a step from this time, s, differs from the first one, for a model that needs steps of equal size. A difference
+/// by a rounding error does not matter.
+pub(crate) fn check_equal_step(model: &str, first: f64, size: f64, time: f64) -> Result<(), Error> {
+    if (size - first).abs() <= 1e-9 * first + 4.0 * f64::EPSILON * time.abs() {
+        return Ok(());
+    }
+    request(format!(
+        "{model} needs steps of equal size (canHandleVariableCommunicationStepSize is not true), but the first step has {first} s and \
+        the step from {time} s has {size} s"
+    ))
 }
 
 /// Relative tolerance of the solvers inside FMUs (section 2.1.6 of FMI 2.0, 2.3.3 of FMI 3.0).
@@ -80,9 +92,10 @@ impl Instance {
             name: if component.is_empty() { "instance" } else { component },
             label: component,
             token: &fmu.description.token,
-            resources: Some(&library.resources),
+            resources: library.resources.as_deref(),
             logging_on: logging.on,
             listener: logging.listener(index),
+            names: Some(Arc::clone(&fmu.description) as Arc<dyn VariableNames>),
             ..Settings::new(interface)
         };
         let client = fmi_client::Instance::new(&library.client, &settings).map_err(|rejection| {

@@ -27,6 +27,7 @@ mod start;
 mod system;
 mod system_instance;
 mod threads;
+mod unit;
 mod values;
 
 pub use batch::{Batch, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};

@@ -10,8 +10,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(crate) struct Library {
     pub client: Arc<fmi_client::Library>,
-    /// Location of the resources, as it is passed to the FMU.
-    pub resources: CString,
+    /// Location of the resources, as it is passed to the FMU; `None` for NULL.
+    pub resources: Option<CString>,
     // Last field, so that the files are removed after the library is unloaded.
     _files: Arc<Files>,
 }
@@ -24,7 +24,7 @@ impl Library {
     pub unsafe fn load(
         path: &Path,
         standard: Standard,
-        resources: CString,
+        resources: Option<CString>,
         files: Arc<Files>,
     ) -> Result<Self, impl std::error::Error> {
         // SAFETY: the caller guarantees that loading is sound.

@@ -73,7 +73,7 @@ impl Found<'_> {
         }
         let others = self.description.display_units.get(&**own).map_or(&[][..], Vec::as_slice);
         if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
-            return Ok((*factor, *offset));
+            return Ok((*factor, if self.variable.is_relative { 0.0 } else { *offset }));
         }
         let known: Vec<_> =
             std::iter::once(&**own).chain(others.iter().map(|(name, ..)| name.as_str())).collect();

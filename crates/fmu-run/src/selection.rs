@@ -3,7 +3,7 @@
 use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Standard};
 use fmi_client::Rejection;
 use std::collections::HashMap;
 
@@ -24,6 +24,7 @@ pub struct Selection {
 #[derive(Clone, Debug, PartialEq)]
 struct Group {
     component: usize,
+    standard: Standard,
     base: BaseType,
     references: Vec<u32>,
     /// Indices of the values in a row.
@@ -93,10 +94,12 @@ impl Selection {
             let reason = found.iter().find_map(|found| found.check_settable(name).err());
             self.read_only = reason.map(|error| error.to_string());
         }
-        for Target { component, base, reference } in found.iter().copied().map(Target::of) {
+        for found in found {
+            let Target { component, base, reference } = Target::of(*found);
             let index = index_of(&self.groups, (component, base));
             if index == self.groups.len() {
-                self.groups.push(Group { component, base, references: Vec::new(), indices: Vec::new() });
+                let (standard, references, indices) = (found.description.standard, Vec::new(), Vec::new());
+                self.groups.push(Group { component, standard, base, references, indices });
             }
             self.groups[index].references.push(reference);
             self.groups[index].indices.push(row);
@@ -134,11 +137,11 @@ impl Selection {
         if let Some(why) = &self.read_only {
             return request(why.clone());
         }
-        for Group { base, indices, .. } in &self.groups {
+        for Group { standard, base, indices, .. } in &self.groups {
             for (index, row) in
                 indices.iter().flat_map(|index| values.chunks_exact(self.len()).map(move |row| (*index, row)))
             {
-                fits(&self.names[index], *base, &row[index..=index])?;
+                fits(&self.names[index], (*base, *standard), &row[index..=index])?;
             }
         }
         Ok(())
@@ -156,10 +159,10 @@ impl Selection {
             let Group { component, references, .. } = &self.groups[0];
             return components[*component].get_numbers(BaseType::Real, references, row);
         }
-        for Group { component, base, references, indices } in &self.groups {
+        for Group { component, base, references, indices, .. } in &self.groups {
             buffer.resize(references.len(), 0.0);
             components[*component].get_numbers(*base, references, buffer)?;
-            if matches!(base, BaseType::Int64 | BaseType::UInt64) {
+            if matches!(base, BaseType::Int64 | BaseType::UInt64 | BaseType::Enumeration) {
                 self.check_rounding(indices, buffer)?;
             }
             indices.iter().zip(&*buffer).for_each(|(index, value)| row[*index] = *value);
@@ -169,8 +172,6 @@ impl Selection {
 
     /// Fails if a 64-bit integer is so large that it may have been rounded.
     fn check_rounding(&self, indices: &[usize], values: &[f64]) -> Result<(), Rejection> {
-        /// Integers below this magnitude are exact in `f64`.
-        const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
         match indices.iter().zip(values).find(|(_, value)| value.abs() >= EXACT) {
             None => Ok(()),
             Some((index, value)) => Err(Rejection::without_fmu(
@@ -195,7 +196,7 @@ impl Selection {
             let Group { component, references, .. } = &self.groups[0];
             return components[*component].set_numbers(BaseType::Real, references, row);
         }
-        for Group { component, base, references, indices } in &self.groups {
+        for Group { component, base, references, indices, .. } in &self.groups {
             buffer.clear();
             buffer.extend(indices.iter().map(|index| row[*index]));
             components[*component].set_numbers(*base, references, buffer)?;
@@ -204,13 +205,23 @@ impl Selection {
     }
 }
 
-/// Checks that a Boolean, an enumeration or an integer can have these values. The FMU itself checks values of floating-point
-/// variables.
-pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
-    let (low, high) = match base {
-        BaseType::Boolean => (0.0, 1.0),
-        BaseType::Enumeration => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        base => match base.range() {
+/// Integers below this magnitude are exact in `f64`.
+const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+
+/// Checks that variables of this type can have these values. The FMU itself checks values of floating-point variables, unless `f32`
+/// cannot represent them. Enumerations have 32 bits in FMI 2.0 and 64 bits in FMI 3.0 (section 2.2.7.2 of FMI 3.0).
+pub(crate) fn fits(name: &str, (base, standard): (BaseType, Standard), values: &[f64]) -> Result<(), Error> {
+    let (low, high) = match (base, standard) {
+        (BaseType::Float32, _) => {
+            let too_large = values.iter().find(|value| value.is_finite() && (**value as f32).is_infinite());
+            return too_large.map_or(Ok(()), |value| {
+                request(format!("{name} is a 32-bit floating-point number and cannot be {value:e}"))
+            });
+        }
+        (BaseType::Boolean, _) => (0.0, 1.0),
+        (BaseType::Enumeration, Standard::Fmi2) => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        (BaseType::Enumeration, Standard::Fmi3) => (1.0 - EXACT, EXACT),
+        (base, _) => match base.range() {
             Some((low, high)) => (low as f64, high as f64),
             None => return Ok(()),
         },
@@ -222,6 +233,7 @@ pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Err
         Some(value) if base == BaseType::Boolean => {
             request(format!("{name} is a Boolean and cannot be {value}"))
         }
+        Some(value) if value.fract() != 0.0 => request(format!("{name} is an integer and cannot be {value}")),
         Some(value) => request(format!("{name} is an integer from {low} to {high} and cannot be {value}")),
     }
 }

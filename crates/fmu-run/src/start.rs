@@ -143,7 +143,7 @@ impl<'a> StartValues<'a> {
                 Start::Value(value) => Cow::Owned(vec![number(value)?]),
                 Start::EachValue(values) => Cow::Owned(values.iter().map(number).collect::<Result<_, _>>()?),
             };
-            fits(name, target.base, &numbers)?;
+            fits(name, (target.base, found.description.standard), &numbers)?;
             all.numbers.push((target, numbers));
         }
         Ok(all)

@@ -43,6 +43,7 @@ impl Log {
         let text = if component.is_empty() { text.to_owned() } else { format!("{component}: {text}") };
         let (level, status) = match message.status {
             Status::Ok => (INFO, "OK"),
+            Status::Pending => (INFO, "Pending"),
             Status::Warning => (WARNING, "Warning"),
             Status::Discard => (WARNING, "Discard"),
             Status::Error => (ERROR, "Error"),

@@ -1,6 +1,6 @@
 //! Converts the inputs of runs: numbers, time series and whole arrays.
 
-use crate::arguments::in_own_unit;
+use crate::arguments::InOwnUnit;
 use crate::buffers::{Numbers, shape};
 use crate::exact::{Exact, exact_type};
 use fmu_run::{System, Trajectory, Value};
@@ -33,7 +33,12 @@ enum Values {
 
 impl Signals {
     /// Converts inputs, whose values are given for this number of communication points or at their own times.
-    pub fn of(system: &System, given: &[(String, Bound<'_, PyAny>)], times: usize) -> PyResult<Self> {
+    pub fn of(
+        system: &System,
+        given: &[(String, Bound<'_, PyAny>)],
+        times: usize,
+        in_own_unit: InOwnUnit,
+    ) -> PyResult<Self> {
         let mut signals = Self::default();
         for (name, value) in given {
             let (own_times, value) = with_times(name, value)?;

@@ -31,8 +31,8 @@ impl<'a> InputRows<'a> {
             Numbers::Shared(values) => Signal::Values(values),
             Numbers::EachRun(values) => Signal::Values(&values[run * times..][..times]),
             Numbers::Sampled { resampling, values, is_held, is_each, .. } => {
-                let first = if *is_each { run * resampling.length } else { 0 };
-                Signal::Sampled(resampling, &values[first..][..resampling.length], *is_held)
+                let first = if *is_each { run * resampling.length() } else { 0 };
+                Signal::Sampled(resampling, &values[first..][..resampling.length()], *is_held)
             }
         }));
     }

@@ -8,7 +8,7 @@ use crate::error::{Error, request};
 use crate::lookup::{Found, article, is_exact};
 use crate::selection::{Selection, fits};
 use crate::system::System;
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Standard};
 
 /// Numeric inputs and their values.
 #[derive(Default)]
@@ -25,7 +25,6 @@ pub(super) enum Numbers<'a> {
     /// Values at the input's own times. `is_each`: whether each run has its own values.
     Sampled {
         resampling: Resampling,
-        times: &'a [f64],
         values: &'a [f64],
         is_held: bool,
         is_each: bool,
@@ -59,11 +58,15 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
     variables.iter().try_for_each(|found| found.check_own(name))?;
     let of = variables[0].variable;
     if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
-        return request(format!(
-            "{name} is not an input but {} {}; give it a start value",
-            article(of.variability.as_deref().unwrap_or(&of.causality)),
-            of.causality
-        ));
+        let kind = match &of.variability {
+            Some(variability) => format!("{variability} {}", of.causality),
+            None => of.causality.clone(),
+        };
+        let hint = match variables[0].check_start(name) {
+            Ok(()) => "; give it a start value",
+            Err(_) => ", which cannot be set",
+        };
+        return request(format!("{name} is not an input but {}{hint}", article(&kind)));
     }
     Ok(variables)
 }
@@ -85,7 +88,7 @@ pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> R
 /// Checks the values of a numeric input. `time` are the communication points.
 pub(super) fn checked<'a>(
     name: &str,
-    base: BaseType,
+    base: (BaseType, Standard),
     trajectory: Trajectory<'a>,
     is_held: bool,
     time: &[f64],
@@ -96,7 +99,7 @@ pub(super) fn checked<'a>(
         Trajectory::EachRun(values) => Numbers::EachRun(values),
         Trajectory::Sampled { times, values } => {
             let resampling = Resampling::of(name, times, time)?;
-            Numbers::Sampled { resampling, times, values, is_held, is_each: values.len() > times.len() }
+            Numbers::Sampled { resampling, values, is_held, is_each: values.len() > times.len() }
         }
         Trajectory::RateOf(other) => {
             return request(format!(

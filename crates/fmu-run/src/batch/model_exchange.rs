@@ -40,7 +40,7 @@ impl<'a> Worker<'a> {
             if let Some(end) = rejection.ended() {
                 self.end(model.parts().instance, times, (simulation.next, end), &mut kept, trajectories);
             }
-            (simulation.next.checked_sub(1), rejection)
+            (simulation.next.checked_sub(1).map(|index| (index, simulation.time)), rejection)
         })
     }
 

@@ -79,14 +79,15 @@ impl<'a> ModelExchangePlan<'a> {
         let (mut held, mut rates) = (Vec::new(), Vec::new());
         each_input(system, batch, exact, |name, trajectory, variables| {
             let of = variables[0].variable;
+            let base = (of.base, variables[0].description.standard);
             if is_held(of) {
-                let values = checked(name, of.base, trajectory, true, batch.time)?;
+                let values = checked(name, base, trajectory, true, batch.time)?;
                 held.push(Source::Numbers { values, slopes: None, is_held: true });
                 self.held.push(name, &variables);
             } else if let Trajectory::RateOf(other) = trajectory {
                 rates.push((name, other, variables));
             } else {
-                let values = checked(name, of.base, trajectory, false, batch.time)?;
+                let values = checked(name, base, trajectory, false, batch.time)?;
                 let slopes = slopes(name, &trajectory, batch)?;
                 self.sources.push(Source::Numbers { values, slopes, is_held: false });
                 self.moving.push(name, &variables);
@@ -144,7 +145,7 @@ fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Optio
     if !matches!(slopes, Trajectory::Constant(_)) && times(values) != times(slopes) {
         return request(format!("the derivatives of {name} must have the same times as its values"));
     }
-    checked(name, BaseType::Real, *slopes, false, batch.time).map(Some)
+    checked(name, (BaseType::Real, Standard::Fmi2), *slopes, false, batch.time).map(Some)
 }
 
 /// Returns the times and the values of a run.
@@ -155,7 +156,9 @@ fn of_run<'a>(numbers: &'a Numbers<'a>, run: usize, points: &'a [f64]) -> (&'a [
         Numbers::Constant(value) => (&points[..1], std::slice::from_ref(value)),
         Numbers::Shared(values) => (points, values),
         Numbers::EachRun(values) => (points, part(values, points.len(), true)),
-        Numbers::Sampled { times, values, is_each, .. } => (times, part(values, times.len(), *is_each)),
+        Numbers::Sampled { resampling, values, is_each, .. } => {
+            (&resampling.times, part(values, resampling.length(), *is_each))
+        }
     }
 }
 

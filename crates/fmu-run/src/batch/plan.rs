@@ -6,12 +6,12 @@ use super::model_exchange_plan::ModelExchangePlan;
 use super::{Batch, Measure, Trajectory};
 use crate::continuous::Integration;
 use crate::error::{Error, request};
-use crate::instance::Tolerance;
+use crate::instance::{Tolerance, check_equal_step};
 use crate::lookup::is_exact;
 use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::{BaseType, Interface, Standard};
 use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
 
@@ -77,6 +77,9 @@ impl<'a> Plan<'a> {
         match interface {
             Interface::CoSimulation => {
                 check_of_co_simulation(batch)?;
+                if let Some(model) = system.fixed_step() {
+                    check_equal_steps(model, time)?;
+                }
                 plan.find_inputs(system, batch)?;
             }
             Interface::ModelExchange => {
@@ -95,15 +98,16 @@ impl<'a> Plan<'a> {
         let inputs = &mut self.inputs;
         each_input(system, batch, &mut self.exact_inputs, |name, trajectory, variables| {
             let of = variables[0].variable;
-            inputs.values.push(checked(name, of.base, trajectory, is_held(of), batch.time)?);
+            let base = (of.base, variables[0].description.standard);
+            inputs.values.push(checked(name, base, trajectory, is_held(of), batch.time)?);
             inputs.variables.push(name, &variables);
             Ok(())
         })?;
-        let mut names = Vec::new();
+        let (mut names, rate) = (Vec::new(), (BaseType::Real, Standard::Fmi2));
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
             once(&mut names, name, "input derivatives")?;
-            self.derivatives.values.push(checked(name, BaseType::Real, *trajectory, true, batch.time)?);
+            self.derivatives.values.push(checked(name, rate, *trajectory, true, batch.time)?);
             self.derivatives.variables.push(name, &variables);
         }
         let derivatives = self.derivatives.variables.targets();
@@ -123,7 +127,7 @@ impl<'a> Plan<'a> {
                 Numbers::Shared(values) => values,
                 Numbers::EachRun(values) => of_run(values, times),
                 Numbers::Sampled { values, is_each: false, .. } => values,
-                Numbers::Sampled { resampling, values, .. } => of_run(values, resampling.length),
+                Numbers::Sampled { resampling, values, .. } => of_run(values, resampling.length()),
             };
             values.iter().for_each(|value| hash.write_u64(value.to_bits()));
         }
@@ -143,6 +147,12 @@ fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
         );
     }
     Ok(())
+}
+
+/// Fails if steps between these times have different sizes.
+fn check_equal_steps(model: &str, time: &[f64]) -> Result<(), Error> {
+    let first = time[1] - time[0];
+    time.windows(2).try_for_each(|pair| check_equal_step(model, first, pair[1] - pair[0], pair[0]))
 }
 
 /// Fails unless there are at least two times, which are finite and increase.

@@ -4,8 +4,9 @@ use crate::error::{Error, request};
 
 /// Maps the communication points to the times of an input.
 pub(super) struct Resampling {
-    /// Number of times of the input.
-    pub length: usize,
+    /// Times of the input, s. A time that differs from a communication point only by a rounding error is replaced by it, so that a
+    /// jump there happens at this point and not shortly before or after it.
+    pub times: Vec<f64>,
     /// For each communication point, the index of the last time of the input that is not after it (0 if there is none), and the
     /// fraction of the way to the next time, from 0 to 1.
     at: Vec<(usize, f64)>,
@@ -25,15 +26,9 @@ impl Resampling {
             let (before, after) = (times[index], times[index + 1]);
             return request(format!("the times of {name} decrease: {after} follows {before}"));
         }
-        let at = (0..points.len()).map(|k| {
-            // A communication point that is before a time of the input only by a rounding error is treated as equal to it.
-            let step = if k > 0 {
-                points[k] - points[k - 1]
-            } else {
-                points.get(1).map_or(0.0, |next| next - points[0])
-            };
-            let point = points[k];
-            let after = times.partition_point(|time| *time <= point + 1e-9 * step);
+        let times: Vec<_> = times.iter().map(|time| rounded_to(points, *time)).collect();
+        let at = points.iter().map(|point| {
+            let after = times.partition_point(|time| time <= point);
             match (after.checked_sub(1), times.get(after)) {
                 (None, _) => (0, 0.0),
                 (Some(before), None) => (before, 0.0),
@@ -42,7 +37,13 @@ impl Resampling {
                 }
             }
         });
-        Ok(Self { length: times.len(), at: at.collect() })
+        let at = at.collect();
+        Ok(Self { times, at })
+    }
+
+    /// Returns the number of times of the input.
+    pub fn length(&self) -> usize {
+        self.times.len()
     }
 
     /// Returns the value at a communication point: interpolated linearly, or the earlier value if values are held.
@@ -57,6 +58,18 @@ impl Resampling {
     pub fn indices(&self) -> Vec<usize> {
         self.at.iter().map(|(index, _)| *index).collect()
     }
+}
+
+/// Returns the communication point from which a time differs by less than 1e-9 of the step there; otherwise the time itself.
+fn rounded_to(points: &[f64], time: f64) -> f64 {
+    let next = points.partition_point(|point| *point < time);
+    let is_near = |index: &usize| {
+        let begin = index.saturating_sub(1);
+        let step = points.get(begin + 1).map_or(0.0, |end| end - points[begin]);
+        (points[*index] - time).abs() <= 1e-9 * step
+    };
+    let near = [Some(next), next.checked_sub(1)].into_iter().flatten().filter(|index| *index < points.len());
+    near.filter(is_near).map(|index| points[index]).next().unwrap_or(time)
 }
 
 #[cfg(test)]
@@ -87,6 +100,7 @@ mod tests {
             (2.0, 2.0)
         );
         assert!((resampling.value(&[0.0, 3.0], 1, false) - 1.0).abs() < 1e-15);
+        assert_eq!(resampling.times, [points[0], points[3]]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::plan::Plan;
 use super::pulse::Pulse;
 use super::watch::{Watch, lock};
 use super::worker::{Exact, Failure, Worker};
-use crate::error::Error;
+use crate::error::{Error, caught};
 use crate::system::System;
 use fmi_abi::Value;
 use std::sync::atomic::Ordering;
@@ -51,7 +51,7 @@ pub(super) fn run(
             && let Some(row) = next()
         {
             let Row { run, trajectories, measures } = row;
-            let result = worker.run(run, plan.time, trajectories, measures);
+            let result = perform(&mut worker, run, plan.time, [trajectories, measures]);
             if watch.is_cancelled() {
                 failures.push(cancelled(Row { run, trajectories, measures }));
                 break;
@@ -92,6 +92,20 @@ fn cancelled(row: Row) -> (usize, Failure) {
     (row.run, Failure { at: None, text: "cancelled".to_owned(), is_silent: false })
 }
 
+/// Performs a run over these times. If it panics, only this run fails.
+fn perform(
+    worker: &mut Worker,
+    run: usize,
+    times: &[f64],
+    [trajectories, measures]: [&mut [f64]; 2],
+) -> Result<Option<String>, Failure> {
+    caught(|| worker.run(run, times, trajectories, measures)).unwrap_or_else(|text| {
+        trajectories.fill(f64::NAN);
+        measures.fill(f64::NAN);
+        Err(Failure { at: None, text, is_silent: false })
+    })
+}
+
 /// Sorts the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
 fn arranged(plan: &Plan, found: impl Iterator<Item = Exact>) -> Vec<Option<Value>> {
     let (outputs, kept) = (plan.exact_outputs.len(), plan.stored_times());
@@ -124,8 +138,8 @@ fn repeat_with_logging(
             && time::Instant::now() < until
             && let Some((run, failure)) = next()
         {
-            let times = failure.at.map_or(0, |at| at + 2).min(plan.time.len());
-            let again = worker.run(*run, &plan.time[..times], &mut trajectories, &mut measures);
+            let times = failure.at.map_or(1, |at| at + 2).min(plan.time.len());
+            let again = perform(&mut worker, *run, &plan.time[..times], [&mut trajectories, &mut measures]);
             if let Err(again) = again
                 && again.at == failure.at
             {

@@ -68,8 +68,9 @@ pub(super) struct Kept {
     wait: usize,
 }
 
-/// Index of the time at which a run stopped (`None` if the initialization failed), and the error.
-pub(super) type Stopped = (Option<usize>, Rejection);
+/// Index of the last communication point before a run stopped, and the time that it reached, s (`None` if the initialization failed);
+/// and the error.
+pub(super) type Stopped = (Option<(usize, f64)>, Rejection);
 
 impl<'a> Worker<'a> {
     pub fn new(
@@ -161,7 +162,7 @@ impl<'a> Worker<'a> {
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();
-        let stopped = match &plan.model_exchange {
+        let stopped: Option<Stopped> = match &plan.model_exchange {
             None => self.follow(times, &mut instance, run, trajectories).err(),
             Some(model_exchange) => {
                 self.integrate(model_exchange, times, &mut instance, run, trajectories).err()
@@ -171,8 +172,8 @@ impl<'a> Worker<'a> {
             self.exact.push((run, std::mem::take(&mut self.exact_of_run)));
         }
         if !self.is_repeated() {
-            let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
-            self.report_time(run, plan.time[at]);
+            let reached = stopped.as_ref().map_or(times.last().copied(), |(at, _)| at.map(|(_, time)| time));
+            self.report_time(run, reached.unwrap_or(plan.time[0]));
             let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.row.clone())));
         }
@@ -203,10 +204,10 @@ impl<'a> Worker<'a> {
             return Ok(Some(rejection.to_string()));
         }
         let text = match at {
-            Some(at) if rejected => format!("at {} s: {rejection}", times[at]),
+            Some((_, time)) if rejected => format!("at {time} s: {rejection}"),
             _ => rejection.to_string(),
         };
-        Err(Failure { at, text, is_silent: rejection.is_silent() })
+        Err(Failure { at: at.map(|(index, _)| index), text, is_silent: rejection.is_silent() })
     }
 
     /// Removes and returns the values of the current run that `f64` cannot represent.
@@ -250,7 +251,7 @@ impl<'a> Worker<'a> {
         let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
-            let at = |rejection| (Some(k), rejection);
+            let at = |rejection| (Some((k, time)), rejection);
             if self.is_caller && self.pulse.is_due() {
                 self.watch.pulse();
             }

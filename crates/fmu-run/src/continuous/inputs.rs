@@ -145,6 +145,11 @@ pub(super) enum Break {
 /// where two polynomials meet.
 const SAME: f64 = 1e-9;
 
+/// Returns whether the relative difference of two values exceeds this limit.
+fn differ(one: f64, other: f64, limit: f64) -> bool {
+    (other - one).abs() > limit * one.abs().max(other.abs())
+}
+
 impl<'a> Signals<'a> {
     /// Creates the inputs from curves. The first `moving` of them are continuous.
     pub fn new(curves: impl Iterator<Item = Curve<'a>>, moving: usize) -> Self {
@@ -162,8 +167,8 @@ impl<'a> Signals<'a> {
         self.find_moving();
     }
 
-    /// Passes the breaks up to this time, s. At the end of the run, continuous inputs keep their last polynomials, because
-    /// otherwise their rates would become 0 there.
+    /// Passes the breaks up to this time, s. At the end of the run, a continuous input that does not jump keeps its last polynomial,
+    /// because otherwise its rate would become 0 there.
     pub(super) fn pass(&mut self, time: f64, is_end: bool) -> Break {
         if self.until() > time {
             return Break::None;
@@ -171,16 +176,18 @@ impl<'a> Signals<'a> {
         let mut found = Break::None;
         let before: Vec<_> = (0..self.all.len()).map(|index| self.value(index, time)).collect();
         for (index, signal) in self.all.iter_mut().enumerate() {
-            if is_end && index < self.moving {
-                signal.until = f64::INFINITY;
-            } else if signal.until <= time {
+            if signal.until <= time {
+                let last = signal.piece;
                 signal.enter(time);
-                found = Break::Kink;
+                if is_end && index < self.moving && !differ(before[index], signal.piece.value(time), SAME) {
+                    (signal.piece, signal.until) = (last, f64::INFINITY);
+                } else {
+                    found = Break::Kink;
+                }
             }
         }
         for (index, before) in before.into_iter().enumerate() {
-            let (after, same) = (self.value(index, time), if index < self.moving { SAME } else { 0.0 });
-            if (after - before).abs() > same * before.abs().max(after.abs()) {
+            if differ(before, self.value(index, time), if index < self.moving { SAME } else { 0.0 }) {
                 found = Break::Jump;
             }
         }

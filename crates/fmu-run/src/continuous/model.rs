@@ -144,9 +144,25 @@ impl Parts<'_> {
 
     /// Reads the derivatives.
     #[inline]
-    fn derivatives(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
+    pub(super) fn derivatives(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
         self.set(time, x)?;
         self.instance.sole().get_continuous(Continuous::Derivatives, values)
+    }
+
+    /// Sets time, inputs and states, and evaluates the derivatives, so that outputs can be read. Some FMUs calculate other variables
+    /// only when the derivatives are read, and would otherwise return old values. Derivatives that the FMU cannot evaluate here are not
+    /// an error, because the solver does not use them.
+    pub fn observe(&mut self, time: f64, x: &[f64]) -> Result<&mut SystemInstance, Rejection> {
+        self.at = None;
+        self.set(time, x)?;
+        let mut values = vec![0.0; x.len()];
+        if !x.is_empty()
+            && let Err(rejection) = self.derivatives(time, x, &mut values)
+            && rejection.status() != Status::Discard
+        {
+            return Err(rejection);
+        }
+        Ok(self.instance)
     }
 
     /// Evaluates the derivatives at the beginning of an interval and fails if one is not finite, because a shorter step would not

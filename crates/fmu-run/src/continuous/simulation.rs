@@ -34,7 +34,7 @@ pub(crate) struct Simulation<'a> {
     /// Index of the first communication point whose outputs have not been read.
     pub next: usize,
     /// Time that has been reached, s.
-    pub(super) time: f64,
+    pub time: f64,
     /// Continuous states.
     pub(super) x: Vec<f64>,
     /// Event indicators.
@@ -47,6 +47,8 @@ pub(crate) struct Simulation<'a> {
     pub(super) step: Option<f64>,
     /// Size of the last step, s.
     pub(super) taken: f64,
+    /// Suggested size of the next step, s, if the FMU continues smoothly after the event that it requested after the last step.
+    pub(super) smooth: Option<f64>,
     pub(super) settings: Settings,
     chatter: Chatter,
     /// Whether no step has been performed since the last event.
@@ -70,6 +72,8 @@ pub(super) enum Arrival {
     Stop,
     /// An event occurred: at this event indicator, or because the FMU requested it after a step.
     Event(Option<usize>),
+    /// An event that the FMU requested after a step has been handled, but the solver must start again.
+    Handled,
     /// The FMU ended the simulation.
     Terminate,
     /// The caller ended the run.
@@ -95,6 +99,7 @@ impl<'a> Simulation<'a> {
             event: None,
             step: None,
             taken: 0.0,
+            smooth: None,
             settings: Settings { solver, rtol, atol: atol.unwrap_or(0.01 * rtol), max_step, reports_steps },
             chatter: Chatter::since(times[0]),
             is_fresh: true,
@@ -107,9 +112,7 @@ impl<'a> Simulation<'a> {
         loop {
             let is_end = self.next + 1 >= self.times.len();
             if self.times[self.next] <= self.time {
-                let mut parts = model.parts();
-                parts.set(self.time, &self.x)?;
-                hooks.record(parts.instance, self.next)?;
+                hooks.record(model.parts().observe(self.time, &self.x)?, self.next)?;
                 self.next += 1;
                 if is_end {
                     return Ok(());
@@ -119,7 +122,8 @@ impl<'a> Simulation<'a> {
             let arrival = self.integrate(model, hooks, stop)?;
             match arrival {
                 Arrival::Cancel => return Ok(()),
-                Arrival::Terminate => return self.end(model),
+                Arrival::Terminate => return Err(self.ended(model)),
+                Arrival::Handled => {}
                 Arrival::Stop | Arrival::Event(_) => self.arrive(model, hooks, arrival)?,
             }
         }
@@ -155,14 +159,50 @@ impl<'a> Simulation<'a> {
         let exact = is_point && hooks.changes(self.next);
         let is_sure = is_timed || exact || matches!(arrival, Arrival::Event(_));
         if is_sure || model.parts().until() <= self.time {
-            let mut parts = model.parts();
-            parts.set(self.time, &self.x)?;
-            hooks.event(parts.instance, self.time, false)?;
+            hooks.event(model.parts().observe(self.time, &self.x)?, self.time, false)?;
         }
         let passed = model.parts().pass(self.time, is_end);
         if !is_sure && passed != Break::Jump {
             return Ok(());
         }
+        let changes = self.handle(model, hooks, arrival, exact)?;
+        if arrival == Arrival::Event(None) && !(changes || is_timed || exact || passed == Break::Jump) {
+            self.step = self.smooth;
+        }
+        Ok(())
+    }
+
+    /// Handles an event that the FMU has requested after a step, before the solver continues. If the event changes neither states nor
+    /// nominal values, the solver need not start again, and the result is `None`. This matters for FMUs that request an event after each
+    /// step (section 3.2.2 of FMI 2.0 allows it). `smooth` tells whether the derivatives are the same as before, too.
+    pub(super) fn step_event(
+        &mut self,
+        model: &Model,
+        hooks: &mut impl Hooks,
+        smooth: &mut bool,
+    ) -> Result<Option<Arrival>, Rejection> {
+        let [mut before, mut after] = [vec![0.0; self.x.len()], vec![0.0; self.x.len()]];
+        hooks.event(model.parts().observe(self.time, &self.x)?, self.time, false)?;
+        model.parts().derivatives(self.time, &self.x, &mut before)?;
+        let (next, z) = (self.event, self.z.clone());
+        let changes = self.handle(model, hooks, Arrival::Event(None), false)?;
+        if changes || self.event != next {
+            return Ok(Some(Arrival::Handled));
+        }
+        model.parts().derivatives(self.time, &self.x, &mut after)?;
+        *smooth = before == after;
+        self.is_fresh = !*smooth || z != self.z;
+        Ok(None)
+    }
+
+    /// Handles an event. Returns whether states or their nominal values have changed.
+    fn handle(
+        &mut self,
+        model: &Model,
+        hooks: &mut impl Hooks,
+        arrival: Arrival,
+        exact: bool,
+    ) -> Result<bool, Rejection> {
         let scale = self.scale();
         if let Some(since) = self.chatter.count(self.time, scale) {
             return Err(self.chattering(arrival, since));
@@ -175,20 +215,19 @@ impl<'a> Simulation<'a> {
                 hooks.set_exact(parts.instance, self.next)?;
             }
         }
-        self.update(model, false)?;
-        let mut parts = model.parts();
-        parts.set(self.time, &self.x)?;
-        hooks.event(parts.instance, self.time, true)
+        let changes = self.update(model, false)?;
+        hooks.event(model.parts().observe(self.time, &self.x)?, self.time, true)?;
+        Ok(changes)
     }
 
     /// Updates the discrete states in Event Mode until the event is complete, enters Continuous-Time Mode and reads the values that
-    /// have changed.
-    fn update(&mut self, model: &Model, is_first: bool) -> Result<(), Rejection> {
+    /// have changed. Returns whether states or their nominal values have changed.
+    fn update(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
         let mut parts = model.parts();
         let event = parts.instance.sole().event()?;
         if event.terminate {
             drop(parts);
-            return self.end(model);
+            return Err(self.ended(model));
         }
         parts.instance.sole().enter_continuous_time_mode()?;
         if event.states_changed || is_first {
@@ -203,17 +242,15 @@ impl<'a> Simulation<'a> {
             parts.indicators(self.time, &self.x, &mut self.z)?;
             self.above.iter_mut().zip(&self.z).for_each(|(above, z)| *above = *z > 0.0);
         }
-        Ok(())
+        Ok(event.states_changed || event.nominals_changed)
     }
 
     /// Returns the error for an end of the simulation that the FMU requests.
-    fn end(&self, model: &Model) -> Result<(), Rejection> {
-        Err(model
-            .parts()
-            .instance
-            .sole()
-            .rejection("Model Exchange", fmi_abi::Status::Discard, Vec::new())
-            .at_end(self.time))
+    fn ended(&self, model: &Model) -> Rejection {
+        let mut parts = model.parts();
+        let rejection =
+            parts.instance.sole().rejection("Model Exchange", fmi_abi::Status::Discard, Vec::new());
+        rejection.at_end(self.time)
     }
 
     /// Returns the error for too many events since this time, s.

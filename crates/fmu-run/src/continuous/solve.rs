@@ -37,18 +37,19 @@ impl Simulation<'_> {
             }
             let (arrival, result) = result?;
             let reached = stop - self.time <= near;
+            // If the interval had only one step, this step may have been shortened to end at `stop`, so the next interval may begin
+            // with the size that was suggested before.
+            let cut = result.steps.total <= 1;
+            let uncut = begin.1.filter(|_| cut).map_or(result.h, |step| step.max(result.h));
             if reached && arrival.is_none_or(|of| of == Arrival::Stop) {
-                // If the interval had only one step, this step may have been shortened to end at `stop`, so the next interval may
-                // begin with the size that was suggested before.
-                let cut = result.steps.total <= 1;
-                self.step = Some(begin.1.filter(|_| cut).map_or(result.h, |step| step.max(result.h)));
+                self.step = Some(uncut);
                 self.time = stop;
                 return Ok(Arrival::Stop);
             }
             // At an event a state is often almost 0, and the solver's own estimate of the first step is then far too small.
             let small = Some((0.01 * self.taken).max(SMALL * self.scale()));
             if let Some(arrival) = arrival {
-                self.step = small;
+                (self.step, self.smooth) = (small, Some(uncut).filter(|step| *step > 0.0));
                 return Ok(arrival);
             }
             match result.status {

@@ -18,6 +18,8 @@ pub(super) struct Stepping<'s, 'a, 'm, H> {
     stop: f64,
     pub arrival: Option<Arrival>,
     pub failure: Option<Rejection>,
+    /// Whether the derivatives have changed at an event after which the solver continues.
+    has_kink: bool,
 }
 
 /// Time, states and event indicators.
@@ -30,7 +32,7 @@ struct Point {
 
 impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
     pub fn of(simulation: &'s mut Simulation<'a>, model: &'s Model<'m>, hooks: &'s mut H, stop: f64) -> Self {
-        Self { simulation, model, hooks, stop, arrival: None, failure: None }
+        Self { simulation, model, hooks, stop, arrival: None, failure: None, has_kink: false }
     }
 
     /// Processes the whole interval as one step, for an FMU without states.
@@ -57,9 +59,7 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         while self.simulation.times[self.simulation.next] < end.time.min(self.stop) {
             let time = self.simulation.times[self.simulation.next];
             at(time, &mut between);
-            let mut parts = self.model.parts();
-            parts.set(time, &between)?;
-            self.hooks.record(parts.instance, self.simulation.next)?;
+            self.hooks.record(self.model.parts().observe(time, &between)?, self.simulation.next)?;
             self.simulation.next += 1;
         }
         let mut parts = self.model.parts();
@@ -69,6 +69,7 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
             requested = parts.instance.sole().completed_integrator_step()?;
         }
         parts.accepted();
+        drop(parts);
         let simulation = &mut *self.simulation;
         (simulation.taken, simulation.time, simulation.is_fresh) = (end.time - begin, end.time, false);
         simulation.x.copy_from_slice(&end.x);
@@ -78,6 +79,13 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         self.arrival = match requested {
             _ if !self.hooks.proceed(simulation.time) => Some(Arrival::Cancel),
             [_, true] => Some(Arrival::Terminate),
+            // A step that ends at `stop` may end at other events, too, which are handled together.
+            [true, _] if indicator.is_none() && simulation.time < self.stop => {
+                let mut smooth = true;
+                let arrival = simulation.step_event(self.model, self.hooks, &mut smooth)?;
+                self.has_kink = !smooth;
+                arrival
+            }
             [true, _] => Some(Arrival::Event(indicator)),
             _ => indicator.map(|indicator| Arrival::Event(Some(indicator))),
         };
@@ -183,6 +191,7 @@ impl<H: Hooks> SolOut for Stepping<'_, '_, '_, H> {
         };
         self.failure = self.step([begin, *end], x, &at).err();
         match (&self.failure, self.arrival) {
+            (None, None) if std::mem::take(&mut self.has_kink) => ControlFlag::ModifiedSolution,
             (None, None) => ControlFlag::Continue,
             _ => ControlFlag::Interrupt,
         }

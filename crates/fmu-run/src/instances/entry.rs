@@ -1,7 +1,7 @@
 //! One of many instances, and functions that process all of them in several threads.
 
 use super::Mask;
-use crate::error::Error;
+use crate::error::{Error, caught};
 use crate::instance::Instance;
 use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
@@ -22,6 +22,8 @@ pub(super) struct Entry {
 #[derive(Debug, Default)]
 pub(super) struct Progress {
     pub time: f64,
+    /// Size of the first step since the initialization, s.
+    pub first_step: Option<f64>,
     pub event: Event,
 }
 
@@ -33,11 +35,13 @@ impl Entry {
         body: impl FnOnce(&mut Progress, &mut SystemInstance) -> Result<(), Rejection>,
     ) -> bool {
         let Self { instance: Some(instance), error: error @ None, progress } = self else { return false };
-        if let Err(rejection) = body(progress, instance) {
-            *error = Some(format!("at {} s: {rejection}", progress.time));
-            return false;
-        }
-        true
+        let why = match caught(|| body(progress, instance)) {
+            Ok(Ok(())) => return true,
+            Ok(Err(rejection)) => rejection.to_string(),
+            Err(panic) => panic,
+        };
+        *error = Some(format!("at {} s: {why}", progress.time));
+        false
     }
 }
 

@@ -11,7 +11,7 @@ pub use states::States;
 
 use crate::description::Description;
 use crate::error::{Error, request};
-use crate::instance::{Experiment, Tolerance};
+use crate::instance::{Experiment, Tolerance, check_equal_step};
 use crate::messages::{Feed, Logged, Logging};
 use crate::selection::Selection;
 use crate::start::{Start, StartValues};
@@ -222,7 +222,7 @@ impl Instances {
         let (system, interface, begin, feed) = (&self.system, self.interface, &self.begin, &self.feed);
         let reset = |index: usize, one: &mut Entry| {
             one.error = None;
-            (one.progress.time, one.progress.event) = (begin.experiment.start_time, Event::default());
+            one.progress = Progress { time: begin.experiment.start_time, ..Progress::default() };
             let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
             let logging = Logging { on: feed.is_some(), feed };
             match SystemInstance::renewed(one.instance.take(), system, interface, &logging) {
@@ -265,9 +265,11 @@ impl Instances {
     /// Performs Co-Simulation steps of this size, s.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the size is not above 0 and finite.
+    /// Returns [`Error::Request`] if the size is not above 0 and finite, or if it differs from the size of the first step and an FMU
+    /// needs steps of equal size.
     pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
         check_size(size)?;
+        self.check_equal_steps(|_| size, mask)?;
         self.alive(mask, |_, progress, instance| {
             instance.step(progress.time, size)?;
             progress.time += size;
@@ -279,7 +281,8 @@ impl Instances {
     /// Performs Co-Simulation steps to this time, s.
     ///
     /// # Errors
-    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance that would make the step.
+    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance that would make the step, or if the
+    /// size of the step differs from the size of the first one and an FMU needs steps of equal size.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
         let steps = |index: usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
         let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
@@ -289,6 +292,7 @@ impl Instances {
                 one.progress.time
             ));
         }
+        self.check_equal_steps(|progress| time - progress.time, mask)?;
         self.alive(mask, |_, progress, instance| {
             instance.step(progress.time, time - progress.time)?;
             progress.time = time;
@@ -313,6 +317,7 @@ impl Instances {
     ) -> Result<(), Error> {
         set.check(values)?;
         check_size(size)?;
+        self.check_equal_steps(|_| size, None)?;
         let inputs = rows(values, set.len(), self.len());
         self.fill(get.len(), read, |index, progress, instance, row| {
             instance.set(set, inputs(index))?;
@@ -320,6 +325,22 @@ impl Instances {
             progress.time += size;
             instance.get(get, row)
         });
+        Ok(())
+    }
+
+    /// If an FMU needs steps of equal size, fails if the next step would have another size than the first one. Otherwise records the
+    /// size.
+    fn check_equal_steps(&mut self, size: impl Fn(&Progress) -> f64, mask: Mask) -> Result<(), Error> {
+        let Some(model) = self.system.fixed_step() else { return Ok(()) };
+        let steps = |index: &usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[*index]);
+        for (_, one) in self.all.iter().enumerate().filter(|(index, one)| steps(index, one)) {
+            let (size, progress) = (size(&one.progress), &one.progress);
+            check_equal_step(model, progress.first_step.unwrap_or(size), size, progress.time)?;
+        }
+        for (_, one) in self.all.iter_mut().enumerate().filter(|(index, one)| steps(index, one)) {
+            let size = size(&one.progress);
+            one.progress.first_step.get_or_insert(size);
+        }
         Ok(())
     }
 

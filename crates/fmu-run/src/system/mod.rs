@@ -334,6 +334,15 @@ impl System {
         Ok(variables)
     }
 
+    /// Returns the name of the first model that needs steps of equal size in Co-Simulation, if there is one (section 4.3.1 of FMI 2.0,
+    /// 4.4 of FMI 3.0).
+    pub(crate) fn fixed_step(&self) -> Option<&str> {
+        let descriptions = self.components().iter().map(|component| &component.fmu.description);
+        let mut fixed = descriptions
+            .filter(|of| of.offer(Interface::CoSimulation).is_some_and(|offer| !offer.variable_step_size));
+        fixed.next().map(|of| of.model_name.as_str())
+    }
+
     /// Fails if a component lacks a capability for this interface type.
     pub(crate) fn check_offer(
         &self,

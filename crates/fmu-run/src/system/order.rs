@@ -69,9 +69,9 @@ struct Set {
 
 /// Returns the index of the set for the output of each connection, and the sets.
 fn sets(ends: &[Ends]) -> (Vec<usize>, Vec<Set>) {
-    let mut inputs: HashMap<usize, Vec<(u32, usize)>> = HashMap::new();
+    let mut inputs: HashMap<usize, Vec<(u64, usize)>> = HashMap::new();
     for (index, (_, to)) in ends.iter().enumerate() {
-        inputs.entry(to.component).or_default().push((to.variable.reference, index));
+        inputs.entry(to.component).or_default().push((to.variable.key(), index));
     }
     inputs.values_mut().for_each(|inputs| inputs.sort_unstable());
     let mut known: HashMap<(usize, Option<*const Dependencies>), usize> = HashMap::new();
@@ -93,10 +93,9 @@ fn sets(ends: &[Ends]) -> (Vec<usize>, Vec<Set>) {
     (ends.iter().map(set).collect(), sets)
 }
 
-/// Returns the connections to inputs whose value references are in the range. `inputs` is sorted.
-fn within<'a>(inputs: &'a [(u32, usize)], range: &Range<u32>) -> impl Iterator<Item = usize> + use<'a> {
-    let [begin, end] =
-        [range.start, range.end].map(|limit| inputs.partition_point(|(reference, _)| *reference < limit));
+/// Returns the connections to inputs whose keys are in the range. `inputs` is sorted.
+fn within<'a>(inputs: &'a [(u64, usize)], range: &Range<u64>) -> impl Iterator<Item = usize> + use<'a> {
+    let [begin, end] = [range.start, range.end].map(|limit| inputs.partition_point(|(key, _)| *key < limit));
     inputs[begin..end].iter().map(|(_, index)| *index)
 }
 

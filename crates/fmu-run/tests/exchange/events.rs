@@ -129,6 +129,67 @@ fn an_event_after_a_step_may_choose_other_states() {
     }
 }
 
+/// An FMU that requests an event after each step is integrated with the same steps as an FMU that does not.
+#[test]
+fn events_after_each_step_do_not_shorten_the_steps() {
+    let time = times(2.0, 4);
+    for standard in VERSIONS {
+        for (solver, rate) in
+            SOLVERS.into_iter().chain([Solver::Rk4]).flat_map(|of| [(of, 1.0), (of, 1000.0)])
+        {
+            if solver == Solver::Rk4 && rate > 1.0 {
+                continue;
+            }
+            let of = |model, events| {
+                let batch = Batch {
+                    start: vec![("p", Start::Same(rate))],
+                    integration: Integration { max_step: Some(0.1), ..tight(solver) },
+                    events,
+                    ..Batch::default()
+                };
+                let runs = run(&opened(model, standard), &time, batch);
+                assert_eq!(runs.errors, []);
+                runs
+            };
+            let (steady, plain) = (of("steady", true), of("dahlquist", false));
+            for ((found, same), time) in steady.trajectories.iter().zip(&plain.trajectories).zip(&time) {
+                close(*found, (-rate * time).exp(), if solver == Solver::Rk4 { 1e-6 } else { 1e-7 });
+                close(*found, *same, 1e-8);
+            }
+            assert!(steady.events.len() < 5000, "{} events", steady.events.len());
+        }
+    }
+}
+
+#[test]
+fn derivatives_may_change_at_an_event_after_a_step() {
+    let time = times(2.0, 20);
+    for standard in VERSIONS {
+        for solver in SOLVERS {
+            let batch = Batch { integration: tight(solver), events: true, ..Batch::default() };
+            let runs = run(&opened("turn", standard), &time, batch);
+            assert_eq!((runs.errors.len(), runs.events.len()), (0, 1), "{solver:?}");
+            let turn = runs.events[0].time;
+            for (found, time) in runs.trajectories.iter().zip(&time) {
+                close(*found, 1.0 + turn - (time - turn).abs(), 1e-8);
+            }
+        }
+    }
+}
+
+#[test]
+fn outputs_are_up_to_date_although_the_fmu_calculates_them_with_the_derivatives() {
+    let time = times(1.0, 500);
+    for standard in VERSIONS {
+        let runs = run(
+            &opened("stale", standard),
+            &time,
+            Batch { integration: tight(Solver::Auto), ..Batch::default() },
+        );
+        runs.trajectories.iter().zip(&time).for_each(|(found, time)| close(*found, (-time).exp(), 1e-7));
+    }
+}
+
 #[test]
 fn an_indicator_that_is_always_zero_is_not_an_event() {
     for standard in VERSIONS {

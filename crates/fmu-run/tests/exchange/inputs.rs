@@ -89,6 +89,31 @@ fn a_ramp_is_followed_exactly() {
     }
 }
 
+/// The value at the last time is the value after the event there, also if the times differ by a rounding error.
+#[test]
+fn an_input_jumps_at_the_end() {
+    for standard in VERSIONS {
+        for (end, jump) in [(1.0, 1.0), (0.3, 0.1 + 0.2), (0.3, 0.3 - f64::EPSILON / 8.0)] {
+            let (own, values) = ([0.0, jump, jump], [0.0, 0.0, 1.0]);
+            for name in ["u", "n"] {
+                let batch = Batch {
+                    time: &[0.0, 0.1, end],
+                    inputs: vec![(name, Trajectory::Sampled { times: &own, values: &values })],
+                    outputs: vec![name, "y"],
+                    every: Some(1),
+                    events: true,
+                    ..Batch::default()
+                };
+                let runs = opened("lag", standard).run(&batch, &Watch::default()).unwrap();
+                assert_eq!(runs.trajectories, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0], "{name} {jump}");
+                let events: Vec<_> =
+                    runs.events.iter().map(|of| (of.time, of.before[0], of.after[0])).collect();
+                assert_eq!(events, [(end, 0.0, 1.0)]);
+            }
+        }
+    }
+}
+
 #[test]
 fn rates_of_other_inputs() {
     let (time, u, w) = ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 5.0, 5.0], [7.0; 4]);

@@ -24,6 +24,10 @@
     M(relay)     /* x' = -1 if x > 0, else 1: after 1 s the sign of x changes again and again. */ \
     M(announce)  /* From t = 0.5 on, each event announces another one at the same time. */ \
     M(swap)      /* x' = x, from x = 1. After the first step with |x| > 2 it requests an event, at which x becomes -x and y = -x. */ \
+    M(stale)     /* x' = -x; y is calculated only when the derivatives are read. */ \
+    M(steady)    /* x' = -p x; requests an event after each step, at which nothing changes. */ \
+    M(turn)      /* x' = 1. After the first step with x > 1.5 it requests an event, from which on x' = -1. */ \
+    M(picky)     /* x' = -x; rejects the nominal values without a message if p = 2. */ \
     M(ending)    /* x' = -x; ends the simulation at the event at x = 0.5. */ \
     M(failing)   /* x' = 1; fails from t = 0.5 on. */
 
@@ -43,7 +47,7 @@ typedef struct {
     fmi3LogMessageCallback log3;
     void *environment;
     char *name;
-    double time, x[2], u, w, p;
+    double time, x[2], u, w, p, y;
     int32_t n, hits;
     int above, sign, wants, is_fmi3;
 } Model;
@@ -76,7 +80,7 @@ static int states(const Model *m) {
 static void start(Model *m) {
     double p = m->model == ball_ || m->model == zeno_ ? 0.7 : m->model == stair_ ? 10 : 1;
     m->mode = START;
-    m->time = m->u = m->w = m->x[1] = 0;
+    m->time = m->u = m->w = m->x[1] = m->y = 0;
     m->n = m->hits = m->wants = 0;
     m->sign = 1;
     m->p = p;
@@ -108,7 +112,7 @@ static int derivatives(Model *m, double d[]) {
     switch (m->model) {
     case ball_: case zeno_: d[0] = x[1]; d[1] = -9.81; break;
     case vanderpol_: d[0] = x[1]; d[1] = m->p * (1 - x[0] * x[0]) * x[1] - x[0]; break;
-    case dahlquist_: d[0] = -m->p * x[0]; break;
+    case dahlquist_: case steady_: d[0] = -m->p * x[0]; break;
     case lag_: d[0] = m->u + m->n - m->p * x[0]; break;
     case nan_: d[0] = m->time < 0.5 ? 1 : NAN; break;
     case root_:
@@ -117,6 +121,8 @@ static int derivatives(Model *m, double d[]) {
         break;
     case relay_: d[0] = m->above ? -1 : 1; break;
     case swap_: d[0] = x[0]; break;
+    case turn_: d[0] = m->sign; break;
+    case stale_: d[0] = -x[0]; m->y = x[0]; break;
     case failing_:
         if (m->time >= 0.5) return failed(m, 3, "the valve is stuck");
         d[0] = 1;
@@ -151,6 +157,10 @@ static int update(Model *m, Update *u) {
     case swap_:
         if (m->wants) { m->x[0] *= -1; m->sign *= -1; m->hits++; u->states = u->nominals = 1; m->wants = 0; }
         break;
+    case steady_: m->hits += m->wants; m->wants = 0; break;
+    case turn_:
+        if (m->wants) { m->sign = -1; m->hits++; m->wants = 0; }
+        break;
     case ending_: u->terminate = m->x[0] <= 0.5; break;
     default: break;
     }
@@ -180,7 +190,7 @@ static int get_real(Model *m, unsigned vr, double *value) {
     case U: *value = m->u; return 0;
     case W: case RATE: *value = m->w; return 0;
     case P: *value = m->p; return 0;
-    case Y: *value = m->sign * m->x[0]; return 0;
+    case Y: *value = m->model == stale_ ? m->y : (m->model == swap_ ? m->sign : 1) * m->x[0]; return 0;
     case X0: case X1: *value = m->x[vr - X0]; return 0;
     case D0: case D1: {
         int status = derivatives(m, d);
@@ -213,6 +223,7 @@ static int set_states(Model *m, const double x[], size_t n) {
 static int completed(Model *m, int *event) {
     if (m->mode != CONTINUOUS) return wrong(m, "completing a step");
     m->wants |= m->model == swap_ && fabs(m->x[0]) > 2 && m->hits == 0;
+    m->wants |= m->model == steady_ || (m->model == turn_ && m->x[0] > 1.5 && m->hits == 0);
     *event = m->wants;
     return 0;
 }
@@ -288,7 +299,8 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real d[], size_t n) {
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) { M2; if (n) z[0] = indicator(m); return fmi2OK; }
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
     M2;
-    for (size_t i = 0; i < n; i++) x[i] = m->hits ? 100 : 1;
+    if (m->model == picky_ && m->p == 2) return fmi2Error;
+    for (size_t i = 0; i < n; i++) x[i] = m->model == swap_ && m->hits ? 100 : 1;
     return fmi2OK;
 }
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {

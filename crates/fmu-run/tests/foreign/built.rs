@@ -53,11 +53,13 @@ pub fn built(manner: &str, standard: Standard, directory: &Path, changes: &[(&st
     }
     let path = directory.join(format!("{manner}.fmu"));
     let library = library(if manner == "exceptions" { "c++" } else { "c" });
-    let entries = [
+    let mut entries = vec![
         ("modelDescription.xml".to_owned(), xml.into_bytes()),
         (format!("binaries/{platform}/foreign.so"), std::fs::read(library).unwrap()),
-        ("resources/gain.txt".to_owned(), b"2.5".to_vec()),
     ];
+    if manner != "null_resources" {
+        entries.push(("resources/gain.txt".to_owned(), b"2.5".to_vec()));
+    }
     packed(&path, entries);
     path
 }
@@ -74,8 +76,13 @@ pub fn packed(path: &Path, entries: impl IntoIterator<Item = (String, Vec<u8>)>)
 
 /// Packs and opens the FMU with this manner.
 pub fn opened(manner: &str, standard: Standard) -> Fmu {
+    opened_with(manner, standard, &[])
+}
+
+/// Packs and opens the FMU with this manner and these replacements in its model description.
+pub fn opened_with(manner: &str, standard: Standard, changes: &[(&str, &str)]) -> Fmu {
     let directory = tempfile::tempdir().unwrap();
-    let path = built(manner, standard, directory.path(), &[]);
+    let path = built(manner, standard, directory.path(), changes);
     // SAFETY: the FMU of these tests.
     unsafe { Fmu::open(&path) }.unwrap()
 }

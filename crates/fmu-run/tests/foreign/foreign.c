@@ -32,6 +32,8 @@
     M(free)                /* Logs while it is freed: OpenModelica. */ \
     M(format)              /* Passes a printf format with arguments to the logger: OpenModelica, FMU SDK. */ \
     M(percent)             /* Logs text that contains percent signs, without arguments: Reference FMUs with paths of resources. */ \
+    M(references)          /* Logs text that refers to variables, as section 2.1.5 of FMI 2.0 describes. */ \
+    M(null_resources)      /* Accepts only NULL as the location of its resources, because it has none. */ \
     M(chatty)              /* Logs each step: OpenModelica. */ \
     M(null_texts)          /* Passes NULL as category and message. */ \
     M(resources)           /* Reads a file of its resources by URI: Dymola, OpenModelica. */ \
@@ -66,7 +68,7 @@ typedef struct {
     fmi3LogMessageCallback log3;
     void *environment;
     char *name;
-    double u, y, gain, tolerance, stop, time, scale, vector[8];
+    double u, slope, y, gain, tolerance, stop, time, scale, vector[8];
     int32_t counter, valve;
     int64_t wide;
     uint64_t natural, size;
@@ -114,7 +116,8 @@ static void *talk(void *argument) {
 
 static void step_model(Instance *i, double time, double size) {
     double error = i->manner == tolerance_ ? (i->has_tolerance ? i->tolerance : 1e-2) : 0.0;
-    i->y += i->u * size * (1.0 + error);
+    i->y += (i->u + 0.5 * i->slope * size) * size * (1.0 + error);
+    i->slope = 0.0;
     if (i->manner == libm_) i->y += sin(time) - sin(time); /* `sin` is resolved when it is called. */
     i->time = time + size;
     i->counter++;
@@ -149,7 +152,7 @@ static void read_resources(Instance *i, const char *location) {
 }
 
 static void set_defaults(Instance *i) {
-    i->u = i->y = 0.0, i->gain = 0.0, i->tolerance = i->stop = 0.0, i->counter = 0, i->valve = 1;
+    i->u = i->slope = i->y = 0.0, i->gain = 0.0, i->tolerance = i->stop = 0.0, i->counter = 0, i->valve = 1;
     i->has_tolerance = i->has_stop = 0;
     i->wide = 0, i->natural = 0, i->size = 3, i->scale = 1.0;
     strcpy(i->label, "none");
@@ -184,8 +187,8 @@ static Instance *begin(Instance *i, int manner, const char *name, const char *re
     i->name = strdup(name);
     set_defaults(i);
     if (first_environment == NULL) first_environment = environment;
-    if (manner == once_ && alive > 0) {
-        LOG(i, fmi2Error, "error", "there is an instance already");
+    if ((manner == once_ && alive > 0) || (manner == null_resources_ && resources != NULL)) {
+        LOG(i, fmi2Error, "error", manner == once_ ? "there is an instance already" : "there are no resources");
         free(i->name), free(i);
         return NULL;
     }
@@ -199,6 +202,7 @@ static Instance *begin(Instance *i, int manner, const char *name, const char *re
         LOG(i, fmi2Warning, "greeting", "my environment is not yours");
     if (manner == null_texts_) LOG(i, fmi2Warning, NULL, NULL);
     if (manner == percent_) LOG(i, fmi2Warning, "text", "100% of %20s is %n, 50%");
+    if (manner == references_) LOG(i, fmi2Warning, "text", "#r%d# and #i8# of ##%d, #b1#, #r77# and #1", 1, 4);
     if (manner == format_) LOG(i, fmi2Warning, "text", "%s has %d of %ld, %.3f and %5.1e, %-4s|%%|%c", "tank", 7, 8L, 0.5, 1e-9, "ab", 'z');
     if (manner == thread_ || manner == other_thread_) pthread_create(&i->thread, NULL, talk, i);
     return i;
@@ -329,6 +333,13 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     (void)vr;
     for (size_t k = 0; k < n; k++) value[k] = ((Instance *)c)->label;
     return (fmi2Status)ok((Instance *)c);
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+                                       const fmi2Real value[]) {
+    (void)vr, (void)order;
+    if (n > 0) ((Instance *)c)->slope = value[0];
+    return fmi2OK;
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set_state) {

@@ -6,8 +6,11 @@
 mod built;
 mod opening;
 
-use built::{built, opened};
-use fmu_run::{Batch, Error, Fmu, Setup, Standard, Start, Status, Tolerance, Trajectory, Value, Watch};
+use built::{built, opened, opened_with};
+use fmu_run::{
+    Batch, Composition, Error, Fmu, Order, Setup, Standard, Start, Status, System, Tolerance, Trajectory,
+    Value, Watch,
+};
 
 const VERSIONS: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
 
@@ -143,6 +146,8 @@ fn messages_reach_a_listener() {
     }
     let expanded = "tank has 7 of 8, 0.500 and 1.0e-09, ab  |%|z";
     assert_eq!(of("format", Standard::Fmi2)[0].2, expanded);
+    assert_eq!(of("references", Standard::Fmi2)[0].2, "u and counter of #4, #b1#, #r77# and #1");
+    assert!(of("references", Standard::Fmi3)[0].2.starts_with("#r%d#"));
 }
 
 #[test]
@@ -246,6 +251,121 @@ fn resources_are_found_under_any_path() {
         let fmu = unsafe { Fmu::open(&path) }.unwrap();
         assert_eq!(end(&fmu), Ok(3.5), "{standard}");
     }
+}
+
+#[test]
+fn missing_resources_have_no_location() {
+    assert_eq!(end(&opened("null_resources", Standard::Fmi3)), Ok(1.0));
+}
+
+/// A difference of temperatures has no offset (section 2.2.3 of FMI 2.0, 2.4.4 of FMI 3.0).
+#[test]
+fn units_of_differences_have_no_offset() {
+    let unit = "<UnitDefinitions><Unit name=\"K\"><BaseUnit K=\"1\"/><DisplayUnit name=\"degC\" offset=\"-273.15\"/></Unit></UnitDefinitions>";
+    let of = |standard, own: &str, shared: &str| {
+        let (variable, kind, start) = match standard {
+            Standard::Fmi2 => ("<Real start=\"0\"/>", "Real", "<Real declaredType=\"T\" start=\"0\""),
+            Standard::Fmi3 => ("name=\"u\"", "Float64Type", "declaredType=\"T\" name=\"u\""),
+        };
+        let attributes = format!("unit=\"K\" displayUnit=\"degC\" {shared}");
+        let types = match standard {
+            Standard::Fmi2 => format!("<SimpleType name=\"T\"><{kind} {attributes}/></SimpleType>"),
+            Standard::Fmi3 => format!("<{kind} name=\"T\" {attributes}/>"),
+        };
+        let close = if standard == Standard::Fmi2 { "/>" } else { "" };
+        let list = format!("{unit}<TypeDefinitions>{types}</TypeDefinitions><DefaultExperiment");
+        let changes = [("<DefaultExperiment", &*list), (variable, &format!("{start} {own}{close}"))];
+        opened_with("plain", standard, &changes).display_unit("u", "degC").unwrap()
+    };
+    for standard in VERSIONS {
+        let relative = "relativeQuantity=\"true\"";
+        assert_eq!(of(standard, "", ""), (1.0, -273.15));
+        assert_eq!(of(standard, relative, ""), (1.0, 0.0));
+        assert_eq!(of(standard, "", relative), (1.0, 0.0));
+        assert_eq!(of(standard, "relativeQuantity=\"false\"", relative), (1.0, -273.15));
+    }
+}
+
+#[test]
+fn steps_have_the_same_size_if_the_fmu_needs_it() {
+    let changes = [("canHandleVariableCommunicationStepSize=\"true\"", "")];
+    for standard in VERSIONS {
+        let fmu = opened_with("plain", standard, &changes);
+        assert_eq!(end(&fmu).map(|y| (y * 1e9).round()), Ok(1e9), "the times differ only by rounding errors");
+        let batch = Batch { time: &[0.0, 0.1, 0.3, 0.35, 1.0], outputs: vec!["y"], ..Batch::default() };
+        let why = fmu.run(&batch, &Watch::default()).unwrap_err().to_string();
+        assert!(
+            why.contains("the first step has 0.1 s and the step from 0.1 s has 0.19999999999999998 s"),
+            "{why}"
+        );
+        let mut two = fmu.instances(&Setup { count: 2, ..Setup::default() }).unwrap();
+        two.step(0.1, None).unwrap();
+        let why = two.step(0.25, None).unwrap_err().to_string();
+        assert!(why.contains("canHandleVariableCommunicationStepSize is not true"), "{why}");
+        two.step_to(0.2, None).unwrap();
+        assert!(two.step_to(0.25, Some(&[false, true])).is_err());
+        two.step_to(0.3, None).unwrap();
+        assert_eq!(two.errors().count(), 0);
+        two.reset(None);
+        two.step(0.25, None).unwrap();
+        opened("plain", standard).run(&batch, &Watch::default()).unwrap();
+    }
+}
+
+/// Variables of different types may have the same value reference (section 2.2.7 of FMI 2.0).
+#[test]
+fn value_references_are_unique_only_within_a_type() {
+    let on = "<ScalarVariable name=\"on\" valueReference=\"1\" causality=\"input\" variability=\"discrete\"><Boolean start=\"false\"/></ScalarVariable></ModelVariables>";
+    for (known, is_loop) in [("10", false), ("1", true)] {
+        let unknown = format!("<Unknown index=\"2\" dependencies=\"{known}\"/>");
+        let changes = [("</ModelVariables>", on), ("<Unknown index=\"2\"/>", &unknown)];
+        let fmu = opened_with("plain", Standard::Fmi2, &changes);
+        let order = Order::Dependencies;
+        let composition = Composition {
+            name: "s",
+            components: vec![("a", &fmu)],
+            connections: vec![("a.y", "a.u")],
+            order,
+        };
+        assert_eq!(System::connect(&composition).is_err(), is_loop, "{known}");
+    }
+}
+
+/// Values that a variable cannot have are errors that name the type.
+#[test]
+fn values_fit_their_variables() {
+    let more = "<Float32 name=\"single\" valueReference=\"51\" causality=\"input\" start=\"0\"/>\
+        <Enumeration name=\"choice\" valueReference=\"9\" causality=\"input\" start=\"1\"/></ModelVariables>";
+    let fmu = opened_with("plain", Standard::Fmi3, &[("</ModelVariables>", more)]);
+    let with = |start| fmu.instances(&Setup { start, ..Setup::default() });
+    let mut one = with(vec![("choice", Start::Same(5e9))]).unwrap();
+    let choice = fmu.select(&["choice"]).unwrap();
+    let mut value = [0.0];
+    one.get(&choice, &mut value);
+    assert_eq!(value, [5e9]);
+    one.set(&choice, &[-6e9], None).unwrap();
+    one.get(&choice, &mut value);
+    assert_eq!(value, [-6e9]);
+    for (name, value, why) in [
+        ("choice", 1e16, "an integer from -9007199254740991 to 9007199254740992"),
+        ("valve", 2.5, "valve is an integer and cannot be 2.5"),
+        ("single", 1e300, "single is a 32-bit floating-point number and cannot be 1e300"),
+        ("y", 1.0, "y is read-only"),
+    ] {
+        let found = with(vec![(name, Start::Same(value))]).unwrap_err().to_string();
+        assert!(found.contains(why), "{found}");
+    }
+    for (name, why) in [
+        ("y", "y is not an input but an output, which cannot be set"),
+        ("tolerance", "tolerance is not an input but a discrete local, which cannot be set"),
+    ] {
+        let inputs = vec![(name, Trajectory::Constant(1.0))];
+        let batch = Batch { time: &[0.0, 1.0], inputs, ..Batch::default() };
+        assert_eq!(fmu.run(&batch, &Watch::default()).unwrap_err().to_string(), why);
+    }
+    let of_fmi2 = opened("plain", Standard::Fmi2)
+        .instances(&Setup { start: vec![("valve", Start::Same(5e9))], ..Setup::default() });
+    assert!(of_fmi2.unwrap_err().to_string().contains("an integer from -2147483648 to 2147483647"));
 }
 
 #[test]

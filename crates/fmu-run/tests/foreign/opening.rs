@@ -102,13 +102,38 @@ fn unusual_archives_are_read() {
     }
 }
 
+/// The library of an FMU may have any plain name, although FMI requires an identifier of C. If it is missing, the message lists the files
+/// that are there.
+#[test]
+fn libraries_have_plain_names() {
+    for (standard, platform) in [(Standard::Fmi2, "linux64"), (Standard::Fmi3, "x86_64-linux")] {
+        let directory = tempfile::tempdir().unwrap();
+        let other = [("modelIdentifier=\"foreign\"", "modelIdentifier=\"2 foreign-models\"")];
+        let why = opened(&built("plain", standard, directory.path(), &other)).unwrap_err();
+        let expected = format!("(binaries/{platform}/2 foreign-models.so); it has: {platform}/foreign.so");
+        assert!(why.ends_with(&expected), "{why}");
+        let unpacked = directory.path().join("unpacked");
+        let archive = std::fs::File::open(directory.path().join("plain.fmu")).unwrap();
+        zip::ZipArchive::new(archive).unwrap().extract(&unpacked).unwrap();
+        let libraries = unpacked.join("binaries").join(platform);
+        std::fs::rename(libraries.join("foreign.so"), libraries.join("2 foreign-models.so")).unwrap();
+        assert_eq!(opened(&unpacked).and_then(|fmu| end(&fmu)), Ok(1.0));
+        let outside = [("modelIdentifier=\"foreign\"", "modelIdentifier=\"../foreign\"")];
+        let why = opened(&built("plain", standard, directory.path(), &outside)).unwrap_err();
+        assert!(why.contains("modelIdentifier \"../foreign\" is not the name of a library"), "{why}");
+    }
+}
+
 #[test]
 fn clocks_are_named() {
     let directory = tempfile::tempdir().unwrap();
-    let clock = "<ModelVariables><Clock name=\"tick\" valueReference=\"99\" causality=\"input\" intervalVariability=\"triggered\"/>";
+    let clock = "<ModelVariables><Clock name=\"tick\" valueReference=\"99\" causality=\"input\" intervalVariability=\"triggered\"/>\
+        <Float64 name=\"ticks\" valueReference=\"98\" causality=\"output\" variability=\"discrete\" clocks=\"99\"/>";
     let path = built("plain", Standard::Fmi3, directory.path(), &[("<ModelVariables>", clock)]);
     let fmu = opened(&path).unwrap();
     assert_eq!(end(&fmu), Ok(1.0));
     let why = fmu.select(&["tick"]).unwrap_err().to_string();
     assert!(why.starts_with("tick is a clock, and clocks are not supported here"), "{why}");
+    let why = fmu.select(&["ticks"]).unwrap_err().to_string();
+    assert!(why.starts_with("ticks has a value only while its clock ticks"), "{why}");
 }
