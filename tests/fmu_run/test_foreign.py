@@ -132,6 +132,21 @@ def test_temperatures_and_their_differences(made):
         assert runs["y"][0, 2] == pytest.approx(5.0)
 
 
+def test_masked_values(made):
+    fmu, masked = made("plain"), np.ma.array([1.0, 9.0], mask=[False, True])
+    model = fmu.instances(2)
+    for call, name in (
+        (lambda: fmu.run([0.0, 1.0], inputs={"u": masked}, outputs=["y"]), "u"),
+        (lambda: fmu.run([0.0, 1.0], start={"gain": masked}, outputs=["y"]), "gain"),
+        (lambda: model.set("u", masked), "values"),
+    ):
+        with pytest.raises(ValueError, match=f"{name} has masked values; replace them with its method filled"):
+            call()
+    runs = fmu.run([0.0, 1.0], inputs={"u": masked.filled(2.0)}, outputs=["u"])
+    assert runs["u"].tolist() == [[1.0, 2.0]]
+    fmu.run([0.0, 1.0], inputs={"u": np.ma.array([1.0, 9.0])}, outputs=["u"]).check()
+
+
 def test_exact_values(made, tmp_path):
     fmu = made("plain", "3.0")
     wide, natural = [2**53 + 1, -(2**63)], 2**64 - 1

@@ -100,12 +100,26 @@ def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
         GOOD.replace(",", ";").encode(),
         GOOD.replace(",", ";").replace(".", ",").encode(),
         GOOD.replace(",", "\t").encode(),
+        b"sep=;\r\n" + GOOD.replace(",", ";").replace(".", ",").encode(),
+        b'\xef\xbb\xbf# log\n"SEP=|"\n\n' + GOOD.replace(",", "|").encode(),
         GOOD.replace(",", " , ").encode(),
         b'"time","theta1","theta2"\n0,"0.1",0.2\n0.001,0.1,0.2\n0.002,0.1,0.2',
         b"\n" + GOOD.encode() + b"\n\n",
         b"note,theta2,time,theta1\nstart,0.2,0,0.1\n,0.2,0.001,0.1\n,0.2,0.002,0.1\n",
     ],
-    ids=["bom", "crlf", "semicolons", "decimal commas", "tabs", "spaces", "quotes", "blank lines", "other columns"],
+    ids=[
+        "bom",
+        "crlf",
+        "semicolons",
+        "decimal commas",
+        "tabs",
+        "sep=;",
+        "sep=|",
+        "spaces",
+        "quotes",
+        "blank lines",
+        "other columns",
+    ],
 )
 def test_spellings_of_one_recording(file: Any, content: Any) -> None:
     motion = read_motion(file(content))
@@ -308,7 +322,8 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     frame = pandas.DataFrame({**table, "x": list("abcd")})
     frame.to_csv(tmp_path / "recording.csv", index=False)
     from_file = read(tmp_path / "recording.csv")
-    for source in (table, frame, frame.set_index("time")):
+    masked = table | {"tau1": np.ma.array([1, 9, 2, 3], mask=[False, True, False, False])}
+    for source in (table, masked, frame, frame.set_index("time")):
         recording = read(source)
         for name in ("time", "theta1", "theta2", "tau1"):
             np.testing.assert_array_equal(recording[name], from_file[name])
@@ -321,6 +336,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     wrong: list[tuple[Any, str]] = [
         ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
         ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at index 1 is not finite"),
+        ({**good, "theta2": np.ma.array([0.0, 9.0], mask=[False, True])}, "theta2: nan at index 1 is masked"),
         ({**good, "theta2": ["a", "b"]}, "recording, column theta2: does not consist of numbers"),
         ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
         ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),

@@ -33,7 +33,7 @@ pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
 pub use text::{SHOWN, is_c_identifier, is_plain_file_name, one_line, shown, shown_to};
-pub use value::Value;
+pub use value::{Value, boolean};
 
 /// Defines the items of an FMI version's module from its list of functions.
 macro_rules! table {

@@ -31,7 +31,7 @@ impl Value {
             BaseType::Real => string.parse().ok().map(Self::Real),
             BaseType::Float32 => string.parse().ok().map(|value: f32| Self::Real(value.into())),
             BaseType::Enumeration => string.parse().ok().map(|value: i64| Self::Integer(value.into())),
-            BaseType::Boolean => string.parse().ok().map(Self::Boolean),
+            BaseType::Boolean => boolean(string).map(Self::Boolean),
             BaseType::Binary => bytes(string).map(Self::Binary),
             BaseType::String => Some(Self::String(string.to_owned())),
             _ => {
@@ -39,6 +39,15 @@ impl Value {
                 string.parse().ok().filter(|value| (min..=max).contains(value)).map(Self::Integer)
             }
         }
+    }
+}
+
+/// Parses a Boolean of XML: `true`, `false`, `1` or `0`.
+pub fn boolean(string: &str) -> Option<bool> {
+    match string.trim() {
+        "true" | "1" => Some(true),
+        "false" | "0" => Some(false),
+        _ => None,
     }
 }
 
@@ -112,11 +121,12 @@ mod tests {
         ] {
             assert_eq!(Value::read(base, &value.to_string()), Some(value));
         }
+        assert_eq!(["1", "0"].map(boolean), [Some(true), Some(false)]);
         assert!(matches!(Value::read(BaseType::Real, "NaN"), Some(Value::Real(value)) if value.is_nan()));
         for (base, string) in [
             (BaseType::Real, "fast"),
             (BaseType::UInt8, "256"),
-            (BaseType::Boolean, "1"),
+            (BaseType::Boolean, "yes"),
             (BaseType::Binary, "0"),
             (BaseType::Binary, "0g"),
         ] {

@@ -303,12 +303,20 @@ impl Instance {
         let (mut sizes, mut values) = (vec![0_usize; n], vec![null::<u8>(); n]);
         let (vr, count) = (vr.as_ptr(), vr.len());
         call!(fmi3 self, fmi3GetBinary(vr, count, sizes.as_mut_ptr(), values.as_mut_ptr(), n))?;
-        let bytes = |(value, size): (*const u8, usize)| match value.is_null() || size == 0 {
-            true => Vec::new(),
-            // SAFETY: the FMU returned this size; the bytes are valid until the next call.
-            false => unsafe { std::slice::from_raw_parts(value, size) }.to_vec(),
+        let bytes = |(value, size): (*const u8, usize)| {
+            let mut bytes = Vec::new();
+            if value.is_null() || size == 0 {
+                return Ok(Value::Binary(bytes));
+            }
+            if bytes.try_reserve_exact(size).is_err() {
+                let why = format!("the value has {size} bytes, for which there is not enough memory");
+                return Err(self.own_rejection("fmi3GetBinary", why));
+            }
+            // SAFETY: the FMU returned this size, which the address space can contain; the bytes are valid until the next call.
+            bytes.extend_from_slice(unsafe { std::slice::from_raw_parts(value, size) });
+            Ok(Value::Binary(bytes))
         };
-        Ok(values.into_iter().zip(sizes).map(|pair| Value::Binary(bytes(pair))).collect())
+        values.into_iter().zip(sizes).map(bytes).collect()
     }
 
     /// Returns whether the FMI version has variables of this type.

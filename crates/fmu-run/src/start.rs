@@ -4,11 +4,11 @@ use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
 use crate::selection::{Target, fits};
 use crate::system::{StartValue, System};
-use fmi_abi::{BaseType, Value};
+use fmi_abi::{BaseType, Value, boolean};
 use std::borrow::Cow;
 
-/// Start value of a variable. A string is the value of a string variable, the name of an item of an enumeration, or `true` or `false`
-/// for a Boolean.
+/// Start value of a variable. A string is the value of a string variable, the name of an item of an enumeration, or `true`, `false`, `1`
+/// or `0` for a Boolean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a> {
     /// One number for all runs or instances; 0 or 1 for a Boolean.
@@ -216,7 +216,7 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
 /// Converts a string to the number of a Boolean or of an item of an enumeration.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
     if found.variable.base == BaseType::Boolean
-        && let Ok(boolean) = text.parse::<bool>()
+        && let Some(boolean) = boolean(text)
     {
         return Ok(f64::from(u8::from(boolean)));
     }

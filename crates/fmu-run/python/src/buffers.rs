@@ -19,6 +19,7 @@ impl Numbers {
         if let Ok(number) = values.cast::<PyFloat>() {
             return Ok(Self::One(number.value()));
         }
+        check_masks(name, values)?;
         if let Ok(buffer) = PyBuffer::get(values)
             && buffer.is_c_contiguous()
         {
@@ -50,10 +51,25 @@ impl Numbers {
     }
 }
 
+/// Fails for a masked array with masked values, because a conversion would return the values under the mask.
+fn check_masks(name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+    static MASKED: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let py = values.py();
+    if values.is_instance(MASKED.import(py, "numpy.ma", "MaskedArray")?)?
+        && py.import("numpy.ma")?.call_method1("is_masked", (values,))?.is_truthy()?
+    {
+        return Err(PyValueError::new_err(format!(
+            "{name} has masked values; replace them with its method filled"
+        )));
+    }
+    Ok(())
+}
+
 /// Converts an argument to a NumPy array of float64. Errors name the argument.
 pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     static ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = values.py();
+    check_masks(name, values)?;
     let no_numbers = |why: &str| PyValueError::new_err(format!("{name}: the values are not numbers{why}"));
     let array = ARRAY.import(py, "numpy", "asarray")?.call1((values,));
     let array = array.map_err(|error| match error.is_instance_of::<PyValueError>(py) {

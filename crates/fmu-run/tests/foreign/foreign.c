@@ -50,6 +50,7 @@
     M(libm)                /* Uses libm but is not linked to it: many C exports. */ \
     M(exceptions)          /* Throws and catches C++ exceptions: JModelica, CATIA, HIFSuite. */ \
     M(no_reset)            /* Returns an error from reset: many tools. */ \
+    M(huge_bytes)          /* Reports SIZE_MAX bytes as the size of a binary value. */ \
     M(huge_state)          /* Reports a serialized state of 2^46 bytes. */ \
     M(endless_state)       /* Reports a serialized state of SIZE_MAX bytes. */ \
     M(growing_state)       /* Reports a larger size of the serialized state with each call. */
@@ -513,7 +514,7 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary value[],
                          size_t n_value) {
     (void)vr, (void)n, (void)n_value;
-    sizes[0] = ((Instance *)c)->n_bytes, value[0] = ((Instance *)c)->bytes;
+    sizes[0] = ((Instance *)c)->manner == huge_bytes_ ? SIZE_MAX : ((Instance *)c)->n_bytes, value[0] = ((Instance *)c)->bytes;
     return fmi3OK;
 }
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_set_state, fmi3Boolean *event,

@@ -243,6 +243,13 @@ fn absurd_sizes_of_states_are_errors() {
 }
 
 #[test]
+fn an_absurd_size_of_a_value_is_an_error() {
+    let mut one = opened("huge_bytes", Standard::Fmi3).instances(&Setup::default()).unwrap();
+    assert_eq!(one.values("bytes_out").unwrap(), [None]);
+    assert!(one.none_left().is_some_and(|why| why.contains("for which there is not enough memory")));
+}
+
+#[test]
 fn resources_are_found_under_any_path() {
     for standard in VERSIONS {
         let directory = tempfile::Builder::new().prefix("a b%20 \u{e4}#").tempdir().unwrap();

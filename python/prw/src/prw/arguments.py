@@ -105,9 +105,9 @@ def columns_of(table: Any) -> dict[str, Any]:
 
 
 def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
-    """The values as a column (n,) of floats. Raises UserError, with a message that begins with `where`, if they
-    are not numbers or not one column."""
-    array = np.asarray(values)
+    """The values as a column (n,) of floats; masked values become NaN. Raises UserError, with a message that begins with `where`,
+    if they are not numbers or not one column."""
+    array = values.astype(np.float64).filled(np.nan) if np.ma.is_masked(values) else np.asarray(values)
     if array.dtype.kind in "mM":
         raise UserError(f"{where}: has dates or durations; write seconds as numbers")
     try:

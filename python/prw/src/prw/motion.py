@@ -127,6 +127,8 @@ def unwrapped(name: str, time: Array, angle: Array) -> tuple[Array, str]:
 
 
 def _numbers(name: str, value: object) -> Array:
+    if np.ma.is_masked(value):
+        raise UserError(f"motion: {name} has masked values; fill or remove them")
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -195,7 +195,9 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
             raise UserError(f"{IN_MEMORY}, column {name}: has {len(column)} rows, but time has {len(found[0])}")
         bad = ~np.isfinite(column) if name not in may_be_empty else np.isinf(column)
         if bad.any():
-            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at index {int(bad.argmax())} is not finite")
+            first = int(bad.argmax())
+            why = "masked" if np.ma.getmaskarray(values[index])[first] else "not finite"
+            raise UserError(f"{IN_MEMORY}, column {name}: {column[first]} at index {first} is {why}")
         found.append(column)
     if len(found[0]) < 2:
         raise UserError(f"{IN_MEMORY}: has {len(found[0])} rows; at least two are needed")

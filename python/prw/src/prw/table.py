@@ -49,10 +49,9 @@ def read_table(
         with open(path, encoding=chosen, newline="") as file:
             return _parse(path, file, choose, may_be_empty, increasing, skip)
     except UnicodeError:
-        if encoding:
-            raise UserError(f"{path}: not {encoding} text; give its encoding, or save it as UTF-8 CSV") from None
+        where = path if encoding else _where(path, _undecodable_line(path))
         raise UserError(
-            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; give its encoding, or save it as UTF-8 CSV"
+            f"{where}: not {encoding or 'UTF-8'} text; save it as UTF-8 CSV, or read it with prw.read(path, encoding=...)"
         ) from None
     except LookupError:
         raise UserError(f"{encoding!r} is not known; try utf-16 or latin-1", argument="encoding") from None
@@ -69,9 +68,14 @@ def _parse(
     path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool, skip: int
 ) -> Array:
     begin, first = _top(file, skip)
+    # Excel reads the separator from such a line above the header.
+    separator = re.fullmatch(r'"?sep=(.)"?\s*', first, re.IGNORECASE)
+    if separator:
+        more, first = _top(file, 0)
+        begin += 1 + more
     if not first:
         raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
-    delimiter = next((d for d in DELIMITERS if d in first), ",")
+    delimiter = separator[1] if separator else next((d for d in DELIMITERS if d in first), ",")
     file.seek(0)
     table = csv.reader(_lines(path, file), delimiter=delimiter, skipinitialspace=True)
     try:
