@@ -2,6 +2,7 @@
 
 use crate::arrays::{Array, Arrays};
 use crate::index::Index;
+use crate::system::Change;
 use crate::unit::Unit;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Standard, Value};
@@ -260,6 +261,32 @@ impl Description {
                 _ => {}
             }
         }
+        self.check_items(output, to, input)
+    }
+
+    /// Checks that an output may be connected to an input by a connection that changes values. Units have been converted.
+    pub(crate) fn connects_by(
+        &self,
+        change: &Change,
+        output: &Variable,
+        to: &Self,
+        input: &Variable,
+    ) -> Result<(), String> {
+        let kinds = [output, input].map(Variable::kind);
+        if change.is_linear() && kinds != ["Real"; 2] {
+            return Err("linear transformations are only for Real".to_owned());
+        }
+        let are_integers = kinds.iter().all(|kind| matches!(*kind, "Integer" | "Enumeration"));
+        match change.maps() > 0 {
+            true if are_integers => Ok(()),
+            _ if kinds[0] != kinds[1] => Err(format!("the output is {}, the input {}", kinds[0], kinds[1])),
+            true => Ok(()),
+            false => self.check_items(output, to, input),
+        }
+    }
+
+    /// Fails if the variables have enumerations with different items.
+    fn check_items(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
         match (self.items(output), to.items(input)) {
             (Some(one), Some(other)) if one != other => {
                 Err("their enumerations have different items".to_owned())
@@ -296,6 +323,13 @@ impl Variable {
     /// Returns whether the variable is a structural parameter, which determines the sizes of arrays and is set in Configuration Mode.
     pub(crate) fn is_structural(&self) -> bool {
         self.causality == "structuralParameter"
+    }
+
+    /// Returns a copy of the variable for a connector that has another unit.
+    pub(crate) fn in_unit(&self, unit: Arc<str>) -> Self {
+        let (unit, display_unit, min, max) = (Some(unit), None, None, None);
+        let attributes = Attributes { unit, display_unit, min, max, ..(*self.attributes).clone() };
+        Self { attributes: Arc::new(attributes), ..self.clone() }
     }
 
     /// Returns a number that identifies the value of the variable in its FMU. It contains the type, because in FMI 2.0 variables of

@@ -54,6 +54,11 @@ impl Loaded {
         Ok(Self { description: Arc::new(description), files, co_simulation, model_exchange })
     }
 
+    /// Returns the directory of the unpacked FMU.
+    pub fn directory(&self) -> &Path {
+        self.files.path()
+    }
+
     /// Returns a copy of the FMU with these values of structural parameters, which change the sizes of arrays.
     pub fn configured(&self, structure: Vec<Structural>) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", self.description.model_name));

@@ -2,6 +2,7 @@
 
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
+use crate::system::{Connector, End};
 use fmi_abi::BaseType;
 
 /// A variable of a component that was found by its name.
@@ -13,6 +14,8 @@ pub(crate) struct Found<'a> {
     pub description: &'a Description,
     /// Name of the output that is connected to the variable.
     pub source: Option<&'a str>,
+    /// The connector of the system by whose name the variable was found, and its connection to the variable.
+    pub connector: Option<(&'a Connector, &'a End)>,
 }
 
 impl Found<'_> {
@@ -26,6 +29,9 @@ impl Found<'_> {
 
     /// Fails if the variable is connected to an output.
     pub fn check_own(self, name: &str) -> Result<(), Error> {
+        if self.connector.is_some_and(|(connector, _)| connector.is_output) {
+            return request(format!("{name} is an output of the system, it cannot be set"));
+        }
         match self.source {
             Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
             None => Ok(()),
@@ -65,7 +71,8 @@ impl Found<'_> {
     /// Returns factor and offset of the conversion: value in `unit` = factor * value of the variable + offset. Fails if `unit` is
     /// neither the unit nor a display unit of the variable.
     pub fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
-        let Some(own) = &self.variable.unit else {
+        let variable = self.connector.map_or(self.variable, |(connector, _)| &connector.variable);
+        let Some(own) = &variable.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));
         };
         if **own == *unit {

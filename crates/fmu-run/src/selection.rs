@@ -3,6 +3,7 @@
 use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
+use crate::system::{Change, End};
 use fmi_abi::{BaseType, Standard};
 use fmi_client::Rejection;
 use std::collections::HashMap;
@@ -29,6 +30,9 @@ struct Group {
     references: Vec<u32>,
     /// Indices of the values in a row.
     indices: Vec<usize>,
+    /// For each variable that has another value than its connector in the system: its index among the references, the change from the
+    /// value of the connector to its value, and the opposite.
+    changes: Vec<(usize, [Change; 2])>,
 }
 
 /// Identifies a variable: component, type and value reference.
@@ -98,14 +102,23 @@ impl Selection {
             let Target { component, base, reference } = Target::of(*found);
             let index = index_of(&self.groups, (component, base));
             if index == self.groups.len() {
-                let (standard, references, indices) = (found.description.standard, Vec::new(), Vec::new());
-                self.groups.push(Group { component, standard, base, references, indices });
+                let (references, indices, changes) = (Vec::new(), Vec::new(), Vec::new());
+                let standard = found.description.standard;
+                self.groups.push(Group { component, standard, base, references, indices, changes });
+            }
+            if let Some((_, End { into, out, .. })) = found.connector
+                && !into.is_identity()
+            {
+                let number = self.groups[index].references.len();
+                self.groups[index].changes.push((number, [into.clone(), out.clone()]));
             }
             self.groups[index].references.push(reference);
             self.groups[index].indices.push(row);
         }
         let [group] = &*self.groups else { return self.is_direct = false };
-        self.is_direct = group.base == BaseType::Real && group.indices.len() == self.names.len();
+        self.is_direct = group.base == BaseType::Real
+            && group.indices.len() == self.names.len()
+            && group.changes.is_empty();
     }
 
     /// Returns the value references if they correspond to the values of a row, because `is_direct` is true or there are no
@@ -159,9 +172,12 @@ impl Selection {
             let Group { component, references, .. } = &self.groups[0];
             return components[*component].get_numbers(BaseType::Real, references, row);
         }
-        for Group { component, base, references, indices, .. } in &self.groups {
+        for Group { component, base, references, indices, changes, .. } in &self.groups {
             buffer.resize(references.len(), 0.0);
             components[*component].get_numbers(*base, references, buffer)?;
+            for (index, [_, out]) in changes {
+                buffer[*index] = out.apply(buffer[*index]);
+            }
             if matches!(base, BaseType::Int64 | BaseType::UInt64 | BaseType::Enumeration) {
                 self.check_rounding(indices, buffer)?;
             }
@@ -196,9 +212,12 @@ impl Selection {
             let Group { component, references, .. } = &self.groups[0];
             return components[*component].set_numbers(BaseType::Real, references, row);
         }
-        for Group { component, base, references, indices, .. } in &self.groups {
+        for Group { component, base, references, indices, changes, .. } in &self.groups {
             buffer.clear();
             buffer.extend(indices.iter().map(|index| row[*index]));
+            for (index, [into, _]) in changes {
+                buffer[*index] = into.apply(buffer[*index]);
+            }
             components[*component].set_numbers(*base, references, buffer)?;
         }
         Ok(())

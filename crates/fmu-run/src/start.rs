@@ -144,6 +144,11 @@ impl<'a> StartValues<'a> {
                 Start::EachValue(values) => Cow::Owned(values.iter().map(number).collect::<Result<_, _>>()?),
             };
             fits(name, (target.base, found.description.standard), &numbers)?;
+            let change = found.connector.map(|(_, end)| &end.into).filter(|change| !change.is_identity());
+            let numbers = match change {
+                Some(change) => numbers.iter().map(|number| change.apply(*number)).collect(),
+                None => numbers,
+            };
             all.numbers.push((target, numbers));
         }
         Ok(all)

@@ -229,7 +229,7 @@ impl SystemInstance {
         let Self { components, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
             row.resize(stage.outputs.len(), 0.0);
-            stage.outputs.get(components, buffer, row)?;
+            stage.get(components, buffer, row)?;
             observe(row);
             stage.inputs.set(components, buffer, row)?;
         }
@@ -247,7 +247,7 @@ impl SystemInstance {
             (Order::Dependencies, _) => self.is_due = true,
             (Order::Jacobi, Some(stage)) => {
                 passed.resize(stage.outputs.len(), 0.0);
-                stage.outputs.get(components, buffer, passed)?;
+                stage.get(components, buffer, passed)?;
             }
         }
         Ok(())

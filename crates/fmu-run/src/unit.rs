@@ -1,5 +1,6 @@
 //! Units as defined in model descriptions (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
 
+use crate::system::Change;
 use std::fmt;
 
 /// Names of the base units.
@@ -28,6 +29,16 @@ impl Unit {
             }
         }
         (!attributes.is_empty()).then_some(unit)
+    }
+
+    /// Returns the conversion of values in this unit to another one; `None` if they measure different quantities.
+    pub fn conversion_to(self, other: Self) -> Option<Change> {
+        if self == other {
+            return Some(Change::default());
+        }
+        let is_same = self.exponents == other.exponents;
+        is_same
+            .then(|| Change::linear(self.factor / other.factor, (self.offset - other.offset) / other.factor))
     }
 
     /// Returns the unit of a difference of quantities, which has no offset.

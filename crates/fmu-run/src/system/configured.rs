@@ -46,7 +46,8 @@ impl System {
         });
         let mut definition = Definition::of(self.name(), components.collect::<Result<_, Error>>()?);
         definition.connectors.clone_from(&self.0.connectors);
-        definition.set_connections(self.0.connections.clone());
+        definition.loose.clone_from(&self.0.loose);
+        definition.set_connections(self.0.connections.clone(), self.0.changes.clone());
         definition.start.clone_from(&self.0.start);
         definition.stop_time = self.0.stop_time;
         let system = match self.sole() {

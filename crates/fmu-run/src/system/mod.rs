@@ -1,5 +1,6 @@
 //! Systems of connected FMUs.
 
+mod change;
 mod configured;
 mod elements;
 mod order;
@@ -18,13 +19,14 @@ use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
 use crate::pool::Pool;
 use crate::selection::Selection;
+pub(crate) use change::Change;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
 use fmi_abi::{BaseType, Interface, shown};
 pub(crate) use order::Exchange;
 pub use order::Order;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -47,9 +49,13 @@ struct Definition {
     by_name: HashMap<String, usize>,
     /// Lengths of the names of the components, in bytes.
     lengths: BTreeSet<usize>,
-    /// Names of the system's inputs and outputs, and the variables that they denote.
-    connectors: BTreeMap<String, Vec<String>>,
+    /// The system's inputs and outputs by name.
+    connectors: BTreeMap<String, Connector>,
+    /// Names of inputs and outputs of the system that no connection leads to an FMU.
+    loose: HashSet<String>,
     connections: Vec<(String, String)>,
+    /// For each connection, the change of values on the way. Empty if units must be equal instead.
+    changes: Vec<Change>,
     /// Index of the first connection to each input.
     sources: HashMap<String, usize>,
     exchange: Exchange,
@@ -66,6 +72,28 @@ pub(crate) struct Component {
     /// Name; empty for a single component.
     pub name: String,
     pub fmu: Arc<Loaded>,
+}
+
+/// An input or output of a system.
+#[derive(Clone, Debug)]
+pub(crate) struct Connector {
+    /// The variable of the first end, in the unit of the connector.
+    pub variable: Variable,
+    /// Whether callers can only read it.
+    pub is_output: bool,
+    /// The variables that it denotes.
+    pub ends: Vec<End>,
+}
+
+/// A connection between an input or output of a system and a variable of a component.
+#[derive(Clone, Debug)]
+pub(crate) struct End {
+    /// Name of the variable.
+    pub variable: String,
+    /// Change from the value of the connector to the value of the variable.
+    pub into: Change,
+    /// The opposite change.
+    pub out: Change,
 }
 
 /// Specification of a system: components and connections.
@@ -105,7 +133,7 @@ impl System {
             composition.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
         let mut definition =
             Definition::of(composition.name, components.map(|(name, fmu)| Component { name, fmu }).collect());
-        definition.set_connections(connections.collect());
+        definition.set_connections(connections.collect(), Vec::new());
         definition.finish(composition.order)
     }
 
@@ -123,9 +151,7 @@ impl System {
     /// Returns all variables with their names in the system: inputs and outputs of the system first, then
     /// variables of the components.
     pub fn variables(&self) -> impl Iterator<Item = (String, &Variable)> {
-        let own = self.0.connectors.iter();
-        let own =
-            own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.variable)));
+        let own = self.0.connectors.iter().map(|(name, connector)| (name.clone(), &connector.variable));
         own.chain(self.components().iter().flat_map(|component| {
             component.fmu.description.variables.iter().map(|of| (joined(&component.name, &of.name), of))
         }))
@@ -424,7 +450,9 @@ impl Definition {
             by_name,
             components,
             connectors: BTreeMap::new(),
+            loose: HashSet::new(),
             connections: Vec::new(),
+            changes: Vec::new(),
             sources: HashMap::new(),
             exchange: Exchange::default(),
             start: Vec::new(),
@@ -434,12 +462,13 @@ impl Definition {
         }
     }
 
-    fn set_connections(&mut self, connections: Vec<(String, String)>) {
+    /// Sets the connections. `changes` has a change for each of them, or is empty if units must be equal.
+    fn set_connections(&mut self, connections: Vec<(String, String)>, changes: Vec<Change>) {
         self.sources.clear();
         for (index, (_, to)) in connections.iter().enumerate() {
             self.sources.entry(to.clone()).or_insert(index);
         }
-        self.connections = connections;
+        (self.connections, self.changes) = (connections, changes);
     }
 
     /// Checks the connections and sorts them into stages.
@@ -467,8 +496,13 @@ impl Definition {
         let mut ends = Vec::new();
         for (index, (from, to)) in self.connections.iter().enumerate() {
             let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
-            if let Err(why) = output.description.connects(output.variable, input.description, input.variable)
-            {
+            let ((from_fmu, output_of), (to_fmu, input_of)) =
+                ((output.description, output.variable), (input.description, input.variable));
+            let checked = match self.changes.get(index) {
+                Some(change) => from_fmu.connects_by(change, output_of, to_fmu, input_of),
+                None => from_fmu.connects(output_of, to_fmu, input_of),
+            };
+            if let Err(why) = checked {
                 return request(format!("{from} cannot feed {to}: {why}"));
             }
             if matches!(output.variable.base, BaseType::String | BaseType::Binary) {
@@ -479,7 +513,8 @@ impl Definition {
             }
             ends.push((output, input));
         }
-        self.exchange = Exchange { order, stages: order::stages(&self.connections, &ends, order)? };
+        let stages = order::stages(&self.connections, &ends, &self.changes, order)?;
+        self.exchange = Exchange { order, stages };
         Ok(System(Arc::new(self)))
     }
 
@@ -497,7 +532,8 @@ impl Definition {
         let with = |component: usize, own: &str| {
             let description = &self.components[component].fmu.description;
             let source = self.sources.get(name).map(|index| self.connections[*index].0.as_str());
-            Some(Found { component, variable: description.variable(own)?, description, source })
+            let variable = description.variable(own)?;
+            Some(Found { component, variable, description, source, connector: None })
         };
         match &*self.components {
             [component] if component.name.is_empty() => with(0, name),
@@ -517,11 +553,20 @@ impl Definition {
 
     fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found: Vec<_> = match self.connectors.get(name) {
-            Some(ends) => ends.iter().filter_map(|end| self.look_up(end)).collect(),
+            Some(connector) => {
+                let found =
+                    |end| Some(Found { connector: Some((connector, end)), ..self.look_up(&end.variable)? });
+                connector.ends.iter().filter_map(found).collect()
+            }
             None => self.look_up(name).into_iter().collect(),
         };
         if !found.is_empty() {
             return Ok(found);
+        }
+        if self.loose.contains(name) {
+            return request(format!(
+                "{name} is a connector that no connection leads to a variable of an FMU"
+            ));
         }
         let missing = self.components.iter().find_map(|component| {
             let own = match component.name.as_str() {

@@ -1,10 +1,13 @@
 //! Determines the sequence in which values are passed from outputs to inputs at a communication point.
 
+use super::Change;
 use crate::description::Dependencies;
 use crate::error::{Error, request};
+use crate::instance::Instance;
 use crate::lookup::Found;
 use crate::selection::Selection;
 use fmi_abi::shown;
+use fmi_client::Rejection;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -33,13 +36,37 @@ pub(crate) struct Exchange {
 pub(crate) struct Stage {
     pub outputs: Selection,
     pub inputs: Selection,
+    /// Changes of values between an output and its input, each with its index in a row.
+    changes: Vec<(usize, Change)>,
+}
+
+impl Stage {
+    /// Reads the outputs, and changes the values for the inputs.
+    pub fn get(
+        &self,
+        components: &mut [Instance],
+        buffer: &mut Vec<f64>,
+        row: &mut [f64],
+    ) -> Result<(), Rejection> {
+        self.outputs.get(components, buffer, row)?;
+        for (index, change) in &self.changes {
+            row[*index] = change.apply(row[*index]);
+        }
+        Ok(())
+    }
 }
 
 /// A connection: an output of a component and the connected input.
 type Ends<'a> = (Found<'a>, Found<'a>);
 
-/// Returns the stages, sorted so that each stage follows the stages on which it depends.
-pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) -> Result<Vec<Stage>, Error> {
+/// Returns the stages, sorted so that each stage follows the stages on which it depends. `changes` has a change for each connection, or
+/// is empty.
+pub(super) fn stages(
+    names: &[(String, String)],
+    ends: &[Ends],
+    changes: &[Change],
+    order: Order,
+) -> Result<Vec<Stage>, Error> {
     let levels = match order {
         Order::Jacobi => vec![0; ends.len()],
         Order::Dependencies => levels(names, ends)?,
@@ -48,8 +75,12 @@ pub(super) fn stages(names: &[(String, String)], ends: &[Ends], order: Order) ->
     let mut stages: Vec<Stage> = (0..count).map(|_| Stage::default()).collect();
     // For each stage, the groups of its outputs and of its inputs, see `Selection::push_to`.
     let mut known: Vec<[HashMap<_, _>; 2]> = (0..count).map(|_| Default::default()).collect();
-    for (((from, to), (output, input)), level) in names.iter().zip(ends).zip(levels) {
+    for (index, (((from, to), (output, input)), level)) in names.iter().zip(ends).zip(levels).enumerate() {
         let [of_outputs, of_inputs] = &mut known[level];
+        if let Some(change) = changes.get(index).filter(|change| !change.is_identity()) {
+            let number = stages[level].outputs.len();
+            stages[level].changes.push((number, change.clone()));
+        }
         stages[level].outputs.push_to(of_outputs, from, &[*output]);
         stages[level].inputs.push_to(of_inputs, to, &[*input]);
     }

@@ -70,7 +70,7 @@ typedef struct {
     void *environment;
     char *name;
     double u, slope, y, gain, tolerance, stop, time, scale, vector[8];
-    int32_t counter, valve;
+    int32_t counter, valve, on;
     int64_t wide;
     uint64_t natural, size;
     char label[64];
@@ -153,7 +153,7 @@ static void read_resources(Instance *i, const char *location) {
 }
 
 static void set_defaults(Instance *i) {
-    i->u = i->slope = i->y = 0.0, i->gain = 0.0, i->tolerance = i->stop = 0.0, i->counter = 0, i->valve = 1;
+    i->u = i->slope = i->y = 0.0, i->gain = 0.0, i->tolerance = i->stop = 0.0, i->counter = 0, i->valve = 1, i->on = 0;
     i->has_tolerance = i->has_stop = 0;
     i->wide = 0, i->natural = 0, i->size = 3, i->scale = 1.0;
     strcpy(i->label, "none");
@@ -321,6 +321,18 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
     for (size_t k = 0; k < n; k++) value[k] = vr[k] == VALVE ? ((Instance *)c)->valve : ((Instance *)c)->counter;
+    return (fmi2Status)ok((Instance *)c);
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) ((Instance *)c)->on = value[k];
+    return (fmi2Status)ok((Instance *)c);
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) value[k] = ((Instance *)c)->on;
     return (fmi2Status)ok((Instance *)c);
 }
 

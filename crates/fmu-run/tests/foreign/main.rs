@@ -5,6 +5,7 @@
 
 mod built;
 mod opening;
+mod ssp;
 
 use built::{built, opened, opened_with};
 use fmu_run::{

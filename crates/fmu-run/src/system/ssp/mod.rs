@@ -1,6 +1,8 @@
 //! SSP files (System Structure and Parameterization 1.0).
 
+mod parameters;
 mod read;
+mod routes;
 mod source;
 #[cfg(feature = "write")]
 mod write;

@@ -1,16 +1,19 @@
-//! Reads systems from SSP files.
+//! Reads systems from SSP files (System Structure and Parameterization 1.0).
 
 use super::FMU;
+use super::parameters::{Binding, Target, Units};
 use super::source::Base;
 use crate::error::Error;
 use crate::files::{Files, Kind, STRUCTURE};
 use crate::fmu::Loaded;
 use crate::start::StartValues;
-use crate::system::{Component, Definition, Order, StartValue, System};
-use fmi_abi::files::{Limits, read_xml};
-use fmi_abi::{shown, xml};
+use crate::system::{Change, Component, Definition, Order, System};
+use crate::unit::Unit;
+use fmi_abi::files::Limits;
+use fmi_abi::{boolean, shown, xml};
 use roxmltree::Node;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::cell::Cell;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,29 +22,60 @@ use std::sync::Arc;
 const MAX_BYTES: usize = 128 << 20;
 
 /// Content of `SystemStructure.ssd`.
-struct Read<'a> {
-    base: Base<'a>,
+pub(super) struct Read<'r> {
+    /// The file, for messages.
+    pub path: &'r Path,
+    pub base: Base<'r>,
     /// Names of the components and paths of their FMUs, in the order of the file.
     components: Vec<(String, PathBuf)>,
-    /// Names of the connectors of the outer and all nested systems.
-    connectors: HashSet<String>,
-    connections: Vec<(String, String)>,
-    start: Vec<(String, Value)>,
+    /// Connectors of systems and components by name.
+    pub connectors: HashMap<String, Declared>,
+    pub connections: Vec<Connection>,
+    /// Bindings of inner elements precede those of their system, whose values replace theirs (section 5.2.3 of SSP 1.0).
+    pub bindings: Vec<Binding<'r>>,
+    pub units: Units,
+    /// Items of enumerations by name.
+    pub enumerations: HashMap<String, Vec<(String, String)>>,
     /// Number of bytes that may still be read.
-    remaining: usize,
+    remaining: Cell<usize>,
 }
 
-/// A start value with its unit.
-#[derive(Clone)]
-struct Value {
-    kind: String,
-    text: String,
-    unit: Option<String>,
+/// A connector as declared in the file.
+pub(super) struct Declared {
+    /// `input`, `output`, `parameter` and so on; empty if missing.
+    pub kind: String,
+    pub unit: Option<Arc<str>>,
+    pub enumeration: Option<String>,
+    /// Whether it belongs to a system, not to a component.
+    pub is_of_system: bool,
+    /// Whether it belongs to the outer system.
+    pub is_outer: bool,
+}
+
+/// A connection as written in the file.
+pub(super) struct Connection {
+    pub ends: [Endpoint; 2],
+    pub suppress_conversion: bool,
+    pub transformation: Option<Transformation>,
+}
+
+/// A connector at one end of a connection.
+pub(super) struct Endpoint {
+    pub name: String,
+    /// Whether it belongs to the system that has the connection, not to one of its elements.
+    pub is_own: bool,
+}
+
+/// A transformation of values (section 4.5.2 of SSP 1.0).
+pub(super) enum Transformation {
+    Change(Change),
+    /// Names of items of enumerations, each with the name that replaces it.
+    Names(Vec<(String, String)>),
 }
 
 impl System {
     /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer system is an input or
-    /// output of the system, with the same name, if it is connected to a component. Start values are read from parameter bindings.
+    /// output of the system, with the same name, if connections lead to a component. Start values are read from parameter bindings.
     /// All files to which the system refers must be in the archive. `path` may also be the directory of an unpacked system.
     ///
     /// # Safety
@@ -49,8 +83,9 @@ impl System {
     ///
     /// # Errors
     /// Returns [`Error::Fmu`] if the file is not an SSP file, if one of its FMUs cannot be loaded, and for unsupported content:
-    /// components that are not FMUs, parameter mappings, signal dictionaries, transformations of connections. Returns
-    /// [`Error::Request`] if a start value does not fit its variable. Also returns the errors of [`connect`](Self::connect).
+    /// components that are not FMUs, and signal dictionaries. Returns [`Error::Request`] if a start value does not fit its variable, or
+    /// if a connection names a connector that does not exist or has no direction. Also returns the errors of
+    /// [`connect`](Self::connect).
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let mut limits = Limits::default();
@@ -60,7 +95,7 @@ impl System {
         let root = document.root_element();
         let system = child(root, "System").ok_or_else(|| fail(format!("{STRUCTURE} has no System")))?;
         let is_archive = matches!(directory, Files::Temporary(_));
-        let mut read = Read::of(Base { directory: directory.path(), is_archive });
+        let mut read = Read::of(path, Base { directory: directory.path(), is_archive }, root);
         read.system(system, "").map_err(fail)?;
 
         let mut loaded: BTreeMap<&Path, Arc<Loaded>> = BTreeMap::new();
@@ -82,8 +117,11 @@ impl System {
             components.push(Component { name: name.clone(), fmu });
         }
         let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), components);
-        read.connect(&mut definition);
-        definition.start = read.start_values(&definition)?;
+        let links = read.links(&definition)?;
+        let routes = read.routes(&definition, &links)?;
+        read.connect(&mut definition, &links, &routes);
+        let start = Target::of(&read, &definition, &links, &routes).start_values()?;
+        definition.start = start;
         let experiment = child(root, "DefaultExperiment");
         definition.stop_time =
             experiment.and_then(|of| of.attribute("stopTime")).and_then(|text| text.parse().ok());
@@ -93,39 +131,44 @@ impl System {
     }
 }
 
-impl<'a> Read<'a> {
-    fn of(base: Base<'a>) -> Self {
+impl<'r> Read<'r> {
+    fn of(path: &'r Path, base: Base<'r>, root: Node) -> Self {
+        let item =
+            |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
+        let enumerations = children(root, "Enumerations").filter_map(|of| {
+            let items = of.children().filter(Node::is_element).filter_map(item).collect();
+            Some((of.attribute("name")?.to_owned(), items))
+        });
         Self {
+            path,
             base,
             components: Vec::new(),
-            connectors: HashSet::new(),
+            connectors: HashMap::new(),
             connections: Vec::new(),
-            start: Vec::new(),
-            remaining: MAX_BYTES,
+            bindings: Vec::new(),
+            units: units(root),
+            enumerations: enumerations.collect(),
+            remaining: Cell::new(MAX_BYTES),
         }
     }
 
     /// Subtracts from the number of bytes that may still be read. Fails if too few remain.
-    fn take(&mut self, bytes: usize) -> Result<(), String> {
-        let remaining = self.remaining.checked_sub(bytes);
-        self.remaining = remaining.ok_or("the names and parameters of its elements take too much memory")?;
+    pub fn take(&self, bytes: usize) -> Result<(), String> {
+        let remaining = self.remaining.get().checked_sub(bytes);
+        self.remaining.set(remaining.ok_or("the names and parameters of its elements take too much memory")?);
         Ok(())
     }
 
     /// Returns the full name of an element. `path` is the name of its system, which ends with a dot or is empty.
-    fn name(&mut self, path: &str, name: &str) -> Result<String, String> {
+    fn name(&self, path: &str, name: &str) -> Result<String, String> {
         self.take(path.len() + name.len() + size_of::<String>())?;
         Ok(format!("{path}{name}"))
     }
 
     /// Reads a system. The names of its elements begin with `path`. The recursion is limited, because the XML parser limits the depth
     /// of the file.
-    fn system(&mut self, node: Node, path: &str) -> Result<(), String> {
-        self.bindings(node, path)?;
-        for connector in children(node, "Connectors") {
-            let name = self.name(path, needed(connector, "name")?)?;
-            self.connectors.insert(name);
-        }
+    fn system(&mut self, node: Node<'r, 'r>, path: &str) -> Result<(), String> {
+        self.connectors(node, path, true)?;
         for element in children(node, "Elements") {
             let name = self.name(path, needed(element, "name")?)?;
             match element.tag_name().name() {
@@ -137,10 +180,27 @@ impl<'a> Read<'a> {
         for connection in children(node, "Connections") {
             self.connection(connection, path)?;
         }
+        self.bindings(node, path, None)
+    }
+
+    fn connectors(&mut self, node: Node, path: &str, is_of_system: bool) -> Result<(), String> {
+        for connector in children(node, "Connectors") {
+            let name = self.name(path, needed(connector, "name")?)?;
+            let kind = connector.attribute("kind").unwrap_or_default().to_owned();
+            let of_type = |name: &str, attribute| {
+                let of_type = connector.children().find(|of| of.tag_name().name() == name);
+                of_type.and_then(|of| of.attribute(attribute))
+            };
+            let unit = of_type("Real", "unit").map(Arc::from);
+            let enumeration = of_type("Enumeration", "name").map(str::to_owned);
+            let is_outer = is_of_system && path.is_empty();
+            self.take(size_of::<Declared>() + kind.len())?;
+            self.connectors.insert(name, Declared { kind, unit, enumeration, is_of_system, is_outer });
+        }
         Ok(())
     }
 
-    fn component(&mut self, element: Node, name: String) -> Result<(), String> {
+    fn component(&mut self, element: Node<'r, 'r>, name: String) -> Result<(), String> {
         let source = needed(element, "source")?;
         let kind = element.attribute("type").unwrap_or(FMU);
         if kind != FMU {
@@ -150,158 +210,116 @@ impl<'a> Read<'a> {
                 shown(kind)
             ));
         }
-        self.bindings(element, &format!("{name}."))?;
+        let path = format!("{name}.");
+        self.connectors(element, &path, false)?;
+        self.bindings(element, &path, Some(self.components.len()))?;
         let file = self.base.find(source).map_err(|why| format!("component {}: {why}", shown(&name)))?;
         self.components.push((name, file));
         Ok(())
     }
 
     fn connection(&mut self, connection: Node, path: &str) -> Result<(), String> {
-        let mut end = |side: &str| -> Result<String, String> {
+        let end = |side: &str| -> Result<Endpoint, String> {
             let connector = needed(connection, &format!("{side}Connector"))?;
             let element = connection.attribute(format!("{side}Element").as_str()).unwrap_or_default();
             let dot = if element.is_empty() { "" } else { "." };
-            self.name(path, &format!("{element}{dot}{connector}"))
+            let name = self.name(path, &format!("{element}{dot}{connector}"))?;
+            Ok(Endpoint { name, is_own: element.is_empty() })
         };
-        let (from, to) = (end("start")?, end("end")?);
-        if let Some(change) = connection.children().find(Node::is_element)
-            && change.tag_name().name().ends_with("Transformation")
-        {
-            let kind = change.tag_name().name();
-            return Err(format!(
-                "the connection from {} to {} has a {}, which is not supported",
-                shown(&from),
-                shown(&to),
-                shown(kind)
-            ));
-        }
-        self.connections.push((from, to));
+        let ends = [end("start")?, end("end")?];
+        let suppress_conversion =
+            connection.attribute("suppressUnitConversion").and_then(boolean) == Some(true);
+        let transformation = Transformation::of(connection)?;
+        self.connections.push(Connection { ends, suppress_conversion, transformation });
         Ok(())
     }
 
-    /// Reads the start values that are bound to an element. Later values replace earlier ones.
-    fn bindings(&mut self, node: Node, path: &str) -> Result<(), String> {
-        for binding in children(node, "ParameterBindings") {
-            let path = self.name(path, binding.attribute("prefix").unwrap_or_default())?;
-            if child(binding, "ParameterMapping").is_some() {
-                return Err(format!(
-                    "the parameters of \"{}\" have a mapping, which is not supported",
-                    shown(&path)
-                ));
-            }
-            match (binding.attribute("source"), child(binding, "ParameterValues")) {
-                (_, Some(values)) => {
-                    let set = values.children().find(|of| of.tag_name().name() == "ParameterSet");
-                    set.map_or(Ok(()), |set| self.parameters(set, &path))?;
-                }
-                (Some(source), None) => {
-                    let file = self.base.find(source)?;
-                    let text = read_xml(&file).map_err(|why| format!("{} {why}", shown(source)))?;
-                    self.take(text.len())?;
-                    let document = xml::parse(&text, &shown(source))?;
-                    self.parameters(document.root_element(), &path)?;
-                }
-                (None, None) => {
-                    return Err(format!("a parameter binding of \"{}\" has no values", shown(&path)));
-                }
-            }
+    fn bindings(&mut self, node: Node<'r, 'r>, path: &str, component: Option<usize>) -> Result<(), String> {
+        for node in children(node, "ParameterBindings") {
+            self.take(path.len() + size_of::<Binding>())?;
+            self.bindings.push(Binding { node, path: path.to_owned(), component });
         }
         Ok(())
-    }
-
-    fn parameters(&mut self, set: Node, path: &str) -> Result<(), String> {
-        for parameter in children(set, "Parameters") {
-            let name = self.name(path, needed(parameter, "name")?)?;
-            let value = parameter.children().find(Node::is_element);
-            let no_value = || format!("{} has no value", shown(&name));
-            let value = value.ok_or_else(no_value)?;
-            let text = value.attribute("value").or_else(|| value.attribute("name"));
-            let text = text.ok_or_else(no_value)?.to_owned();
-            let (kind, unit) =
-                (value.tag_name().name().to_owned(), value.attribute("unit").map(str::to_owned));
-            self.take(text.len() + unit.as_ref().map_or(0, String::len) + size_of::<Value>())?;
-            self.start.push((name, Value { kind, text, unit }));
-        }
-        Ok(())
-    }
-
-    /// Finds the connections between components, which may lead through connectors of nested systems, and the connectors of the outer
-    /// system.
-    fn connect(&self, definition: &mut Definition) {
-        let is_own = |definition: &Definition, name: &str| definition.look_up(name).is_some();
-        let mut connections = Vec::new();
-        for ((_, to), from) in self.connections.iter().zip(self.origins()) {
-            match [is_own(definition, from), is_own(definition, to)] {
-                [true, true] => connections.push((from.to_owned(), to.clone())),
-                [false, true] => definition.connectors.entry(from.to_owned()).or_default().push(to.clone()),
-                [true, false] => _ = definition.connectors.insert(to.clone(), vec![from.to_owned()]),
-                [false, false] => {}
-            }
-        }
-        definition.set_connections(connections);
-    }
-
-    /// Returns the origin of each connection, which is the start of the chain of connections that ends with it.
-    fn origins(&self) -> impl Iterator<Item = &str> {
-        let mut first = HashMap::new();
-        for (index, (_, to)) in self.connections.iter().enumerate() {
-            first.entry(to.as_str()).or_insert(index);
-        }
-        let before = |index: usize| first.get(self.connections[index].0.as_str()).copied();
-        // For each connection, the first connection of its chain, once it is known.
-        let mut begins: Vec<Option<usize>> = vec![None; self.connections.len()];
-        for index in 0..begins.len() {
-            let (mut at, mut path) = (index, Vec::new());
-            while begins[at].is_none() {
-                // In a cycle of connections, any of them may be the first.
-                begins[at] = Some(at);
-                path.push(at);
-                match before(at) {
-                    Some(next) => at = next,
-                    None => break,
-                }
-            }
-            let begin = begins[at];
-            path.into_iter().for_each(|index| begins[index] = begin);
-        }
-        begins.into_iter().flatten().map(|index| self.connections[index].0.as_str())
-    }
-
-    /// Returns the start values by variable, in the variable's unit. Values of inputs that are connected to outputs are left out,
-    /// because the outputs overwrite them. Values of unconnected connectors are left out, because they have no effect.
-    fn start_values(&self, definition: &Definition) -> Result<Vec<(String, StartValue)>, Error> {
-        let mut all: Vec<(String, StartValue)> = Vec::new();
-        for (name, Value { kind, text, unit }) in &self.start {
-            let leads_nowhere = self.connectors.contains(name) && !definition.connectors.contains_key(name);
-            if leads_nowhere {
-                continue;
-            }
-            let found = definition.find(name)?[0];
-            if found.source.is_some() {
-                continue;
-            }
-            let value = match (kind.as_str(), text.parse::<f64>()) {
-                ("Real" | "Integer", Ok(number)) => {
-                    let scale = unit.as_deref().map(|unit| found.display_unit(name, unit)).transpose()?;
-                    let (factor, offset) = scale.unwrap_or((1.0, 0.0));
-                    StartValue::Number((number - offset) / factor)
-                }
-                _ => StartValue::Text(text.clone()),
-            };
-            all.push((name.clone(), value));
-        }
-        Ok(all)
     }
 }
 
-fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+impl Transformation {
+    /// Reads the transformation of a connection or of an entry of a mapping, if there is one.
+    pub fn of(node: Node) -> Result<Option<Self>, String> {
+        let is_transformation = |node: &Node| node.tag_name().name().ends_with("Transformation");
+        let Some(node) = node.children().find(is_transformation) else { return Ok(None) };
+        let kind = node.tag_name().name();
+        let number = |name: &str, default| match node.attribute(name) {
+            None => Ok(default),
+            Some(text) => text
+                .trim()
+                .parse::<f64>()
+                .map_err(|_| format!("{name} of a {kind} is {:?}, not a number", shown(text))),
+        };
+        if kind == "LinearTransformation" {
+            let change = Change::linear(number("factor", 1.0)?, number("offset", 0.0)?);
+            return Ok(Some(Self::Change(change)));
+        }
+        let entries = node.children().filter(Node::is_element);
+        let pairs = entries.map(|entry| Ok([needed(entry, "source")?, needed(entry, "target")?]));
+        let pairs: Vec<[&str; 2]> = pairs.collect::<Result<_, String>>()?;
+        let value = |text: &str| match kind {
+            "BooleanMappingTransformation" => boolean(text).map(|value| f64::from(u8::from(value))),
+            _ => text.trim().parse::<i32>().ok().map(f64::from),
+        };
+        match kind {
+            "BooleanMappingTransformation" | "IntegerMappingTransformation" => {
+                let wrong = |text: &str| format!("a {kind} cannot contain {:?}", shown(text));
+                let value = |text: &str| value(text).ok_or_else(|| wrong(text));
+                let pairs = pairs.into_iter().map(|[from, to]| Ok((value(from)?, value(to)?)));
+                Ok(Some(Self::Change(Change::map(pairs.collect::<Result<_, String>>()?))))
+            }
+            "EnumerationMappingTransformation" => {
+                let pairs = pairs.into_iter().map(|[from, to]| (from.to_owned(), to.to_owned()));
+                Ok(Some(Self::Names(pairs.collect())))
+            }
+            other => Err(format!(
+                "a connection or mapping has the transformation {}, which is unknown",
+                shown(other)
+            )),
+        }
+    }
+
+    /// Returns the change of values between enumerations with these items.
+    pub fn change(&self, from: &[(String, String)], to: &[(String, String)]) -> Result<Change, String> {
+        let number = |items: &[(String, String)], name: &String| {
+            let item = items.iter().find(|(item, _)| item == name);
+            let number = item.and_then(|(_, number)| number.trim().parse::<f64>().ok());
+            number.ok_or_else(|| format!("{} is not an item of the enumeration", shown(name)))
+        };
+        match self {
+            Self::Change(change) => Ok(change.clone()),
+            Self::Names(pairs) => {
+                let pairs = pairs.iter().map(|(one, other)| Ok((number(from, one)?, number(to, other)?)));
+                pairs.collect::<Result<_, String>>().map(Change::map)
+            }
+        }
+    }
+}
+
+/// Reads the definitions of units in an SSD or SSV file.
+pub(super) fn units(root: Node) -> Units {
+    let unit = |node: Node| {
+        let attributes = child(node, "BaseUnit")?.attributes();
+        let attributes: Vec<_> = attributes.map(|of| (of.name().to_owned(), of.value().to_owned())).collect();
+        Some((node.attribute("name")?.to_owned(), Unit::of(&attributes)?))
+    };
+    children(root, "Units").filter_map(unit).collect()
+}
+
+pub(super) fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.tag_name().name() == name)
 }
 
-fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+pub(super) fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
 }
 
-fn needed<'a>(node: Node<'a, 'a>, name: &str) -> Result<&'a str, String> {
+pub(super) fn needed<'a>(node: Node<'a, 'a>, name: &str) -> Result<&'a str, String> {
     node.attribute(name).ok_or_else(|| format!("a {} lacks {name}", shown(node.tag_name().name())))
 }

@@ -1,0 +1,257 @@
+//! Start values of a system: parameter sets and the mappings of their names and values (sections 5.2.3, 6 and 7 of SSP 1.0).
+
+use super::read::{Read, Transformation, child, children, needed, units};
+use super::routes::{Link, NamedUnit, Routes};
+use super::source::Base;
+use crate::error::{Error, request};
+use crate::lookup::Found;
+use crate::system::{Change, Definition, StartValue};
+use crate::unit::Unit;
+use fmi_abi::files::read_xml;
+use fmi_abi::{boolean, shown, xml};
+use roxmltree::Node;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A parameter binding of a system or a component.
+pub(super) struct Binding<'r> {
+    pub node: Node<'r, 'r>,
+    /// Name of the system or component, which ends with a dot or is empty.
+    pub path: String,
+    /// Index of the component, unless it is the binding of a system.
+    pub component: Option<usize>,
+}
+
+/// A value of a parameter set.
+#[derive(Clone)]
+struct Value {
+    kind: String,
+    text: String,
+    unit: Option<NamedUnit>,
+}
+
+/// An entry of a parameter mapping.
+struct Entry {
+    target: String,
+    suppress_conversion: bool,
+    transformation: Option<Transformation>,
+}
+
+/// Entries of a mapping by the name of the parameter. A parameter may be mapped to several names.
+type Mapping = HashMap<String, Vec<Entry>>;
+
+/// The system whose parameters are read.
+pub(super) struct Target<'t> {
+    read: &'t Read<'t>,
+    definition: &'t Definition,
+    routes: &'t Routes<'t>,
+    /// The connections from each connector.
+    next: HashMap<&'t str, Vec<&'t Link<'t>>>,
+}
+
+impl<'t> Target<'t> {
+    pub fn of(
+        read: &'t Read<'t>,
+        definition: &'t Definition,
+        links: &'t [Link<'t>],
+        routes: &'t Routes<'t>,
+    ) -> Self {
+        let mut next: HashMap<&str, Vec<&Link>> = HashMap::new();
+        links.iter().for_each(|link| next.entry(link.from).or_default().push(link));
+        Self { read, definition, routes, next }
+    }
+
+    /// Returns the start values by the names of variables, in their units. Later values replace earlier ones, and values of a system
+    /// replace values of the systems and components in it. Values without a variable are ignored, because a parameter set may be made for
+    /// several systems. Values of inputs that are connected to outputs are left out, because the outputs replace them.
+    pub fn start_values(&self) -> Result<Vec<(String, StartValue)>, Error> {
+        let (read, mut all) = (self.read, Vec::new());
+        for binding in &read.bindings {
+            let directory = binding.component.map(|index| self.definition.components[index].fmu.directory());
+            let values = read.values(binding, directory).map_err(|why| read.fail(&why))?;
+            let mapping = read.mapping(binding, directory).map_err(|why| read.fail(&why))?;
+            for (name, value) in values {
+                let Some(mapping) = &mapping else {
+                    self.apply(&format!("{}{name}", binding.path), &value, None, &mut all)?;
+                    continue;
+                };
+                for entry in mapping.get(&name).into_iter().flatten() {
+                    self.apply(&format!("{}{}", binding.path, entry.target), &value, Some(entry), &mut all)?;
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// Adds the start values of the variables that a name denotes: a variable of a component, or the variables to which a connector leads.
+    fn apply(
+        &self,
+        name: &str,
+        value: &Value,
+        entry: Option<&Entry>,
+        all: &mut Vec<(String, StartValue)>,
+    ) -> Result<(), Error> {
+        let Self { read, definition, routes, next } = self;
+        let is_overwritten =
+            || routes.get(name).is_some_and(|route| definition.look_up(route.origin).is_some());
+        let ends = match (definition.look_up(name), read.connectors.get(name)) {
+            (Some(_), _) => vec![(name, Change::default())],
+            (None, Some(connector)) if connector.is_of_system && !is_overwritten() => {
+                read.downstream(definition, (next, routes), name)?
+            }
+            _ => Vec::new(),
+        };
+        let unit = read.unit_of(definition, name);
+        for (variable, change) in ends {
+            let found = definition.look_up(variable).filter(|found| found.source.is_none());
+            if let Some(found) = found {
+                let bytes = variable.len() + value.text.len() + size_of::<(String, StartValue)>();
+                read.take(bytes).map_err(|why| read.fail(&why))?;
+                let value = value.converted(name, found, unit.as_ref(), entry, &change)?;
+                all.push((variable.to_owned(), value));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Read<'_> {
+    pub fn fail(&self, why: &str) -> Error {
+        Error::Fmu(format!("{}: {why}", self.path.display()))
+    }
+
+    /// Returns the file to which an element refers, and its name; `None` if the element has the content itself. `directory` is the
+    /// component's.
+    fn file(&self, node: Node, directory: Option<&Path>) -> Result<Option<(String, String)>, String> {
+        let Some(source) = node.attribute("source").filter(|source| !source.is_empty()) else {
+            return Ok(None);
+        };
+        let file = match (node.attribute("sourceBase"), directory) {
+            (Some("component"), Some(directory)) => Base { directory, is_archive: true }.find(source)?,
+            (Some("component"), None) => {
+                return Err(format!(
+                    "{} is to be found in a component, but belongs to a system",
+                    shown(source)
+                ));
+            }
+            _ => self.base.find(source)?,
+        };
+        let text = read_xml(&file).map_err(|why| format!("{} {why}", shown(source)))?;
+        Ok(Some((source.to_owned(), text)))
+    }
+
+    /// Reads the values of a parameter binding, by name.
+    fn values(&self, binding: &Binding, directory: Option<&Path>) -> Result<Vec<(String, Value)>, String> {
+        let prefix = binding.node.attribute("prefix").unwrap_or_default();
+        if let Some(values) = child(binding.node, "ParameterValues") {
+            let set = child(values, "ParameterSet");
+            return set.map_or(Ok(Vec::new()), |set| self.parameters(set, prefix));
+        }
+        let Some((name, text)) = self.file(binding.node, directory)? else {
+            return Err(format!("a parameter binding of \"{}\" has no values", shown(&binding.path)));
+        };
+        self.take(text.len())?;
+        let document = xml::parse(&text, &shown(&name))?;
+        self.parameters(document.root_element(), prefix)
+    }
+
+    fn parameters(&self, set: Node, prefix: &str) -> Result<Vec<(String, Value)>, String> {
+        let units = units(set);
+        let mut found = Vec::new();
+        for parameter in children(set, "Parameters") {
+            let name = format!("{prefix}{}", needed(parameter, "name")?);
+            let value = parameter.children().find(Node::is_element);
+            let no_value = || format!("{} has no value", shown(&name));
+            let value = value.ok_or_else(no_value)?;
+            let text = value.attribute("value").or_else(|| value.attribute("name")).ok_or_else(no_value)?;
+            let unit = value
+                .attribute("unit")
+                .map(|unit| NamedUnit { name: unit.into(), definition: units.get(unit).copied() });
+            self.take(name.len() + text.len() + size_of::<(String, Value)>())?;
+            let (kind, text) = (value.tag_name().name().to_owned(), text.to_owned());
+            found.push((name, Value { kind, text, unit }));
+        }
+        Ok(found)
+    }
+
+    /// Reads the mapping of a parameter binding, if it has one. Then only the parameters in it are used, with their new names.
+    fn mapping(&self, binding: &Binding, directory: Option<&Path>) -> Result<Option<Mapping>, String> {
+        let Some(node) = child(binding.node, "ParameterMapping") else { return Ok(None) };
+        let Some((name, text)) = self.file(node, directory)? else {
+            return self.entries(child(node, "ParameterMapping").unwrap_or(node)).map(Some);
+        };
+        self.take(text.len())?;
+        let document = xml::parse(&text, &shown(&name))?;
+        self.entries(document.root_element()).map(Some)
+    }
+
+    fn entries(&self, mapping: Node) -> Result<Mapping, String> {
+        let mut entries = Mapping::new();
+        let nodes = mapping.children().filter(|node| node.tag_name().name() == "MappingEntry");
+        for node in nodes {
+            let (source, target) = (needed(node, "source")?, needed(node, "target")?.to_owned());
+            self.take(source.len() + target.len() + size_of::<Entry>())?;
+            let transformation = Transformation::of(node)?;
+            let suppress_conversion =
+                node.attribute("suppressUnitConversion").and_then(boolean) == Some(true);
+            let entry = Entry { target, suppress_conversion, transformation };
+            entries.entry(source.to_owned()).or_default().push(entry);
+        }
+        Ok(entries)
+    }
+}
+
+impl Value {
+    /// Converts the value to the unit of the parameter with this name, applies the transformation of the mapping, and then the change on
+    /// the way to the variable.
+    fn converted(
+        &self,
+        name: &str,
+        found: Found,
+        unit: Option<&NamedUnit>,
+        entry: Option<&Entry>,
+        change: &Change,
+    ) -> Result<StartValue, Error> {
+        let transformation = entry.and_then(|entry| entry.transformation.as_ref());
+        let number = match self.kind.as_str() {
+            "Real" | "Integer" => Some(self.text.trim().parse::<f64>().map_err(|_| {
+                Error::Request(format!(
+                    "the value of {} is {:?}, not a number",
+                    shown(name),
+                    shown(&self.text)
+                ))
+            })?),
+            "Boolean" => boolean(&self.text).map(|value| f64::from(u8::from(value))),
+            _ => None,
+        };
+        let Some(mut number) = number else {
+            return match transformation {
+                None => Ok(StartValue::Text(self.text.clone())),
+                Some(Transformation::Names(pairs)) => {
+                    let mapped = pairs.iter().find(|(from, _)| *from == self.text);
+                    Ok(StartValue::Text(mapped.map_or(&self.text, |(_, to)| to).clone()))
+                }
+                Some(_) => request(format!("{} has a transformation, but is not a number", shown(name))),
+            };
+        };
+        if let (Some(own), false) = (&self.unit, entry.is_some_and(|entry| entry.suppress_conversion)) {
+            number = match unit.map(|unit| own.conversion_to(unit)) {
+                Some(Ok(change)) => change.apply(number),
+                // Without definitions, the unit may be a display unit of the variable.
+                _ => {
+                    let (factor, offset) = found.display_unit(name, &own.name)?;
+                    (number - offset) / factor
+                }
+            };
+        }
+        if let Some(transformation) = transformation {
+            let change = transformation.change(&[], &[]);
+            let fail = |why| Error::Request(format!("the value of {} cannot be mapped: {why}", shown(name)));
+            number = change.map_err(fail)?.apply(number);
+        }
+        Ok(StartValue::Number(change.apply(number)))
+    }
+}
+
+/// Definitions of units by name.
+pub(super) type Units = HashMap<String, Unit>;
