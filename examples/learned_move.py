@@ -7,7 +7,6 @@ tested on 1,000 other wrists with noisy sensors, and compared with input shapers
     make examples; .venv/bin/python examples/learned_move.py
 """
 
-from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -30,40 +29,36 @@ def shaped(impulses: int, duration: float) -> np.ndarray:
     return np.asarray(np.diff(GOAL * s**3 * (10 - 15 * s + 6 * s**2) @ weights / weights.sum()) / STEP)
 
 
-def draw(value: float, unlike: int, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Returns `count` values: `unlike` different random values, repeated."""
-    return np.resize(rng.uniform(0.8 * value, 1.2 * value, unlike), count)
-
-
-def wrists(count: int, unlike: int) -> VectorEnv:
-    """Environments of `unlike` different wrists. Action: rate of both motors. Reward: negative squared error after MOVE."""
+def wrists(count: int) -> VectorEnv:
+    """Environments of random wrists. Action: rate of both motors. Reward: negative squared error after MOVE."""
     task = Task(
         fmu="target/fmu/prw_testbed.fmu",
         actions={"rate": (-RATE, RATE)},
         inputs=("theta1", "theta2", "omega1", "omega2"),
         to_inputs=lambda rate, motors: np.hstack([motors[:, :2] + STEP * motors[:, 2:], rate, rate]),
         observations=tuple(NOISE),
+        noise=NOISE,
         reward=lambda before, rate, after: -np.where(envs.steps * STEP > MOVE, (after[:, 1] - GOAL) ** 2, 0),
         step=STEP,
         length=1000,
         failed_reward=-1e6,
         start={"use_omega": True},
-        drawn={name: partial(draw, value, unlike) for name, value in VARIED.items()},
+        drawn={name: (0.8 * value, 1.2 * value) for name, value in VARIED.items()},
     )
     envs = VectorEnv(task, count)
     return envs
 
 
 def play(envs: VectorEnv, rates: np.ndarray, gains: np.ndarray, unlike: int, seed: int) -> tuple[np.ndarray, ...]:
-    """Pitch (times, n) in deg and the return (n,) of runs with these motors' rates (n, times) and feedback gains (n, 3)."""
-    noise, (observed, _) = np.random.default_rng(seed), envs.reset(seed=seed)
-    wanted, pitch, total = np.zeros(envs.num_envs), [observed[:, 1]], np.zeros(envs.num_envs)
+    """Pitch (times, n) in deg and the return (n,) of runs with these motors' rates (n, times) and feedback gains (n, 3). Environments with
+    the same seed have the same wrist and noise; there are `unlike` different ones."""
+    measured, _ = envs.reset(seed=[1000 * seed + k % unlike for k in range(envs.num_envs)])
+    wanted, pitch, total = np.zeros(envs.num_envs), [envs.values[:, 1]], np.zeros(envs.num_envs)
     for rate in rates.T:
-        measured = observed + np.resize(noise.normal(0, list(NOISE.values()), (unlike, 3)), observed.shape)
         errors = np.column_stack([10 * (wanted - measured[:, 0]), 10 * (wanted - measured[:, 1]), measured[:, 2]])
-        observed, reward, *_ = envs.step(np.clip(rate + (gains * errors).sum(axis=1), -RATE, RATE)[:, None])
+        measured, reward, *_ = envs.step(np.clip(rate + (gains * errors).sum(axis=1), -RATE, RATE)[:, None])
         wanted, total = wanted + STEP * rate, total + reward
-        pitch.append(observed[:, 1])
+        pitch.append(envs.values[:, 1])
     return np.rad2deg(pitch), total
 
 
@@ -76,7 +71,7 @@ def policy(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def learn(count: int, rounds: int) -> np.ndarray:
     """The parameters of the policy. Each round moves them to the weighted mean of the best quarter of the candidates."""
-    envs, rng, candidates = wrists(count, WRISTS), np.random.default_rng(1), count // WRISTS
+    envs, rng, candidates = wrists(count), np.random.default_rng(1), count // WRISTS
     middle = np.hstack([[0.5, 0, 0], np.sin(np.linspace(0, np.pi, HATS + 2)[1:-1])])
     spread = np.diag(np.hstack([np.ones(3), np.full(HATS, 0.16)]))
     weights = np.log(candidates / 4 + 0.5) - np.log(np.arange(1, candidates // 4 + 1))
@@ -94,7 +89,7 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
     begun, still = perf_counter(), np.zeros((1, 3))
     learned = policy(learn(count, rounds)[None])
     print(f"learned in {perf_counter() - begun:.0f} s, from {count * rounds:,} moves")
-    figure, left, envs = Figure(figsize=(8, 3.6), layout="constrained"), {}, wrists(fresh, fresh)
+    figure, left, envs = Figure(figsize=(8, 3.6), layout="constrained"), {}, wrists(fresh)
     motions, shares = figure.subplots(1, 2)
     for name, duration, (rates, gains), colour in (
         ("quintic", MOVE, (shaped(1, MOVE)[None], still), "#D55E00"),

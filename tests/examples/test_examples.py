@@ -179,11 +179,6 @@ def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> Non
     assert len(figure.axes) == 2
 
 
-def test_the_drawn_wrists_differ(learned: Any) -> None:
-    drawn = learned.draw(2.0, 3, np.random.default_rng(1), 7)
-    assert len({*drawn}) == 3 and np.array_equal(drawn[:3], drawn[3:6]) and (np.abs(drawn - 2.0) <= 0.4).all()
-
-
 def test_planned_motion_reaches_the_goal_and_stays(capsys: pytest.CaptureFixture[str]) -> None:
     planner = importlib.import_module("predictive_control")
     figure, errors = planner.main(rollouts=256, length=1.0)

@@ -34,7 +34,7 @@ def task(testbed) -> Task:
         step=STEP,
         length=20,
         failed_reward=-100.0,
-        drawn={"k1": (100.0, 140.0), "J3": lambda rng, n: 0.0127 * rng.lognormal(0.0, 0.1, n)},
+        drawn={"k1": (100.0, 140.0), "J3": lambda rng: 0.0127 * rng.lognormal(0.0, 0.1)},
     )
 
 
@@ -93,10 +93,14 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
 def test_environments_equal_instances(task, mode) -> None:
     """Results are bit-identical, also in later episodes, if the parameters come from a random generator with the same seed."""
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
-    rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
+    rngs, actions = (
+        [np.random.default_rng(3 + k) for k in range(4)],
+        np.random.default_rng(4).uniform(-1, 1, (50, count, 2)),
+    )
 
     def begin_episode():
-        drawn = {"k1": rng.uniform(100.0, 140.0, count), "J3": 0.0127 * rng.lognormal(0.0, 0.1, count)}
+        each = [(rng.uniform(100.0, 140.0), 0.0127 * rng.lognormal(0.0, 0.1)) for rng in rngs]
+        drawn = dict(zip(("k1", "J3"), np.array(each).T))
         wrists.reset(start=drawn)
         assert np.array_equal(envs._instances.get(("k1", "J3")).T, [*drawn.values()])
         return wrists.get(OBSERVED)
@@ -134,11 +138,85 @@ def test_environments_equal_instances(task, mode) -> None:
         envs._own.instances()
 
 
+SENSED = {
+    "observations": dict.fromkeys(OBSERVED, (-50.0, 50.0)),
+    "privileged": ("theta3",),
+    "goals": {"goal": (0.1, 0.2), "other": lambda rng: rng.normal()},
+    "noise": {"roll": 0.01, "tau1": 0.1},
+    "delays": {"tau1": 3, "theta1": 2},
+    "reward": lambda before, action, after: -np.abs(after[:, 0] - after[:, 3]) - after[:, 5] ** 2 - before[:, 1] ** 2,
+    "length": 100,
+}
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_noise_delays_goals_and_privileged_variables(task, mode) -> None:
+    """The reward has the exact values; the agent's ones are late, and their noise is new in each step, episode and environment."""
+    plain = replace(task, **SENSED, drawn={})
+    seen, exact = (VectorEnv(each, 3, autoreset_mode=mode) for each in (plain, replace(plain, noise={}, delays={})))
+    (observed, _), (truth, _) = seen.reset(seed=2), exact.reset(seed=2)
+    assert seen.single_observation_space.shape == (5,) and np.array_equal(observed[:, 3:], truth[:, 3:])
+    assert ((truth[:, 3] > 0.1) & (truth[:, 3] < 0.2)).all() and len({*truth[:, 3], *truth[:, 4]}) == 6
+    actions, late = np.random.default_rng(1).uniform(-1, 1, (100, 3, 2)), np.zeros(2)
+    differences, truths = [observed - truth], [truth]
+    for k, action in enumerate(actions):
+        before = exact.values
+        observed, reward, *_, infos = seen.step(action)
+        late = np.stack([actions[k - 2, :, 0] if k >= 2 else np.zeros(3), action[:, 1]], axis=1)
+        truth, *_, true_infos = exact.step(late)
+        if k == 99 and mode is AutoresetMode.SAME_STEP:
+            assert (seen.steps == 0).all() and not np.array_equal(observed[:, 3:], differences[0][:, 3:])
+            observed, truth = np.stack(infos["final_obs"]), np.stack(true_infos["final_obs"])
+        else:
+            assert np.array_equal(seen.values, exact.values) and np.array_equal(exact.values[:, :5], truth)
+            assert np.array_equal(reward, SENSED["reward"](before, action, exact.values))
+        truths.append(truth)
+        delayed = np.column_stack([truth[:, :2], truths[max(k + 1 - 3, 0)][:, 2], truth[:, 3:]])
+        differences.append(observed - delayed)
+    noise = np.array(differences)
+    assert not noise[:, :, [0, 3, 4]].any()
+    assert noise.std(axis=(0, 1))[[1, 2]] == pytest.approx([0.01, 0.1], rel=0.15)
+    assert np.abs(np.corrcoef(noise[:, :, 1:3].reshape(101, 6).T) - np.eye(6)).max() < 0.35
+
+
+def test_a_late_action(task) -> None:
+    late, exact = (VectorEnv(replace(task, delays=delays), 2) for delays in ({"theta1": 1}, {}))
+    assert np.array_equal(late.reset(seed=1)[0], exact.reset(seed=1)[0])
+    for applied in (0.0, 0.3, 0.3):
+        assert np.array_equal(late.step(np.full((2, 2), [0.3, 0.0]))[0], exact.step(np.full((2, 2), [applied, 0.0]))[0])
+
+
+def test_draws_do_not_depend_on_the_number_of_environments(task) -> None:
+    """Also in later episodes. A list of seeds selects the draws of each environment, and a mask those that begin anew."""
+    actions = np.random.default_rng(1).uniform(-1, 1, (150, 64, 2))
+
+    def play(count, seed, which=None):
+        envs = VectorEnv(replace(task, **SENSED), count)
+        found = [envs.reset(seed=seed)[0]]
+        for action in actions:
+            found += envs.step(action[which or slice(count)])[:2]
+        return found
+
+    few, many = play(8, 5), play(64, 5)
+    assert same(few, [values[:8] for values in many]) and not same(few, play(8, 6))
+    swapped = play(8, list(range(12, 4, -1)), slice(7, None, -1))
+    assert same(few, [values[::-1] for values in swapped])
+    envs = VectorEnv(replace(task, **SENSED), 2)
+    first, _ = envs.reset(seed=[1, 1])
+    assert np.array_equal(first[0], first[1])
+    second, _ = envs.reset(seed=[1, 1], options={"reset_mask": np.array([True, False])})
+    assert np.array_equal(second, first)
+    third, _ = envs.reset(seed=[None, 1])
+    assert not np.array_equal(third[0], first[0]) and np.array_equal(third[1], first[1])
+    with pytest.raises(ValueError, match="seed must have one number for each of 2 environments, it has 1"):
+        envs.reset(seed=[1])
+
+
 def test_env_equals_vector_env_and_seeds_are_reproducible(task) -> None:
-    one, many = play_randomly(SyncVectorEnv([lambda: Env(task)]), 50), play_randomly(VectorEnv(task, 1), 50)
+    one, many = play_randomly(SyncVectorEnv([lambda: Env(task)] * 3), 50), play_randomly(VectorEnv(task, 3), 50)
     assert same(one, many)
-    assert same(many, play_randomly(VectorEnv(task, 1), 50))
-    assert not same(many, play_randomly(VectorEnv(task, 1), 50, seed=6))
+    assert same(many, play_randomly(VectorEnv(task, 3), 50))
+    assert not same(many, play_randomly(VectorEnv(task, 3), 50, seed=6))
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
@@ -244,6 +322,13 @@ def test_inputs_from_actions(task) -> None:
         ({"step": 0.0}, "step above 0"),
         ({"inputs": MOTORS}, "inputs and to_inputs, or neither"),
         ({"start": {"k9": 1.0}}, "k9"),
+        ({"privileged": ("yaw",)}, "yaw"),
+        ({"noise": {"theta3": 1.0}}, "noise: theta3 is not among pitch, roll, tau1"),
+        ({"noise": {"roll": -1.0}}, "noise: roll needs a finite number of at least 0, not -1"),
+        ({"delays": {"goal": 1}}, "delays: goal is not among pitch, roll, tau1, theta1, theta2"),
+        ({"delays": {"roll": 1.5}}, "delays: roll needs an integer of at least 0, not 1.5"),
+        ({"goals": {"roll": (0.0, 1.0)}}, "goals: roll is an observation; choose another name"),
+        ({"drawn": {"k1": (2.0, 1.0)}}, "drawn: k1 needs .low, high., low not above high, or a function, not"),
     ],
 )
 def test_invalid_tasks(task, changed, message) -> None:
@@ -264,7 +349,8 @@ def test_invalid_results_of_functions(task) -> None:
         with pytest.raises(ValueError, match=r"reset_mask must be \(2,\) of bool"):
             envs.reset(options={"reset_mask": [1, 0]})
     for count in (1, 2):
-        envs = VectorEnv(replace(task, drawn={"k1": lambda rng, n: np.linspace(100, -1, n + 1)[1:]}), count)
+        drawn = iter(np.linspace(100, -1, count + 1)[1:])
+        envs = VectorEnv(replace(task, drawn={"k1": lambda rng, drawn=drawn: next(drawn)}), count)
         with pytest.raises(fmu_run.FmuError, match=rf"instance {count - 1} cannot begin .* k1 = -1: .*k1"):
             envs.reset()
 

@@ -30,6 +30,10 @@ _Array = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 _Named = str | Sequence[str] | Mapping[str, tuple[float, float]]
 _Info = dict[str, Any]
+#: A value for each episode: uniform from (low, high), or by a function of the environment's random generator.
+_Draw = tuple[float, float] | Callable[[np.random.Generator], float]
+#: Number of steps for which an environment draws its noise at a time.
+_BLOCK = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +51,8 @@ class Task:
     observations
         Numeric variables that are observed after each step, in one of the forms of `actions`.
     reward
-        Function (observation before, action, observation after) -> (n,).
+        Function (values before, action, values after) -> (n,). The values are (n, columns): the observations without noise and delay, the
+        goals, and the privileged variables.
     step
         The time between actions, s.
     length
@@ -61,8 +66,16 @@ class Task:
     start
         Start values for all episodes, by name: numbers or strings.
     drawn
-        Start values that are drawn for each episode, by name: uniformly from (low, high), or by a function (generator, count) ->
-        (count,).
+        Start values that are drawn for each episode, by name: uniformly from (low, high), or by a function of a random generator that
+        returns a number. Each environment has its own generator, so its draws do not depend on how many environments there are.
+    goals
+        Values that are drawn for each episode like `drawn`, by any names. The agent observes them after the observations.
+    privileged
+        Names of numeric variables that `reward` and `terminated` use, but that the agent does not observe.
+    noise
+        Standard deviations of the noise of observations, by name.
+    delays
+        Numbers of steps by which observations and actions are late, by name. In an episode, late actions are 0 until the first arrives.
     failed_reward
         The reward for a step that the FMU rejects, or after which an observation is not finite. Such a step also ends the episode. The
         reward should be worse than anything that the rest of the episode can cost; otherwise the agent learns to provoke failures.
@@ -81,9 +94,11 @@ class Task:
     inputs: Sequence[str] | None = None
     to_inputs: Callable[[_Array, _Array], ArrayLike] | None = None
     start: Mapping[str, float | str] = field(default_factory=dict)
-    drawn: Mapping[str, tuple[float, float] | Callable[[np.random.Generator, int], ArrayLike]] = field(
-        default_factory=dict
-    )
+    drawn: Mapping[str, _Draw] = field(default_factory=dict)
+    goals: Mapping[str, _Draw] = field(default_factory=dict)
+    privileged: Sequence[str] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
+    delays: Mapping[str, int] = field(default_factory=dict)
     threads: int | None = 1
 
 
@@ -130,42 +145,70 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         try:
             actions = _bounds("actions", task.actions, fmu.variables)
             observations = _bounds("observations", task.observations, fmu.variables)
-            self._inputs, self._observed = tuple(task.inputs or actions), tuple(observations)
+            self._inputs, self._read = tuple(task.inputs or actions), (*observations, *task.privileged)
+            _check_sensors(task, actions, observations)
             for name in self._inputs:
                 if name in fmu.variables and (found := fmu.variables[name].causality) != "input":
                     raise ValueError(f"{name} is not an input, its causality is {found}")
             self._instances = fmu.instances(num_envs, start=task.start, threads=task.threads)
-            for names in (self._inputs, self._observed):
+            for names in (self._inputs, self._read):
                 self._instances.get(names)  # Raises for unknown names.
         except Exception:
             self.close()
             raise
-        self.single_action_space, self.single_observation_space = _box(actions), _box(observations)
+        goals = {name: (-np.inf, np.inf) if callable(how) else how for name, how in task.goals.items()}
+        seen = {**observations, **goals}
+        self.single_action_space, self.single_observation_space = _box(actions), _box(seen)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         #: (num_envs,): number of steps of each instance since its episode began.
         self.steps = np.zeros(num_envs, dtype=np.int64)
-        self._drawn = {name: np.empty(num_envs) for name in task.drawn}
+        #: The random generator of each instance.
+        self.generators = [np.random.default_rng() for _ in range(num_envs)]
+        self._drawn = np.empty((num_envs, len(task.drawn) + len(task.goals)))
+        self._noisy = np.array([list(seen).index(name) for name in task.noise], dtype=np.int64)
+        self._noise = np.empty((num_envs, _BLOCK, len(task.noise)))
+        self._late = _Late([task.delays.get(name, 0) for name in seen], num_envs)
+        self._late_actions = _Late([task.delays.get(name, 0) for name in actions], num_envs)
+        self._seen = np.empty((num_envs, len(seen)))
         self._over: _Bools = np.zeros(num_envs, dtype=bool)
-        self._observation: _Array | None = None
+        self._values: _Array | None = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
+    @property
+    def values(self) -> _Array:
+        """(num_envs, columns): the values that `reward` gets, after the last step."""
+        if self._values is None:
+            raise ResetNeeded("reset comes before values")
+        return self._values.copy()
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[_Array, _Info]:
         """Begin new episodes of all instances, or of those in `options["reset_mask"]`, (num_envs,) of bool. The first call always begins
-        all.
+        all. Instance k has the seed `seed` + k, as in Gymnasium's own vector environments, or seed[k].
 
         Returns
         -------
         (num_envs, observations), and an empty dict
         """
-        super().reset(seed=seed)
+        seeds = (
+            list(seed)
+            if isinstance(seed, Sequence)
+            else [None if seed is None else seed + k for k in range(self.num_envs)]
+        )
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed must have one number for each of {self.num_envs} environments, it has {len(seeds)}")
         which = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=bool)))
         if which.shape != (self.num_envs,) or which.dtype != bool:
             raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, it is {which.shape} of {which.dtype}")
-        if self._observation is None:
+        if self._values is None:
             which = np.ones(self.num_envs, dtype=bool)
-            self._observation = np.empty((self.num_envs, len(self._observed)))
-        self._begin(which, self._observation)
-        return self._observation.copy(), {}
+            self._values = np.empty((self.num_envs, len(self._read) + len(self.task.goals)))
+        for index, own in enumerate(seeds):
+            if which[index] and own is not None:
+                self.generators[index] = np.random.default_rng(own)
+        self._begin(which, self._values)
+        return self._seen.copy(), {}
 
     def step(self, actions: ArrayLike) -> tuple[_Array, _Array, _Bools, _Bools, _Info]:
         """Perform a step of all instances.
@@ -179,14 +222,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         -------
         observations (num_envs, observations), rewards, terminated and truncated (num_envs,), and infos
         """
-        before, renew = self._observation, self._over
+        before, renew = self._values, self._over
         if before is None or (self._mode is AutoresetMode.DISABLED and renew.any()):
             which = "all" if before is None else f"episodes {np.flatnonzero(renew).tolist()} are over"
             raise ResetNeeded(f"reset comes before step: {which}")
         acting = np.asarray(actions, dtype=np.float64)
         if acting.shape != self.action_space.shape:
             raise ValueError(f"actions must be {self.action_space.shape}, they are {acting.shape}")
-        after, errors = self._advance(acting, before)
+        applied = acting
+        if self.task.delays:
+            self._late_actions.push(acting)
+            applied = self._late_actions.read()
+        after, errors = self._advance(applied, before)
         self.steps += 1
         rewards = self._judged("reward", self.task.reward(before, acting, after)).astype(np.float64)
         rewards[list(errors)] = self.task.failed_reward
@@ -196,6 +243,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             terminated = self._judged("terminated", ends(before, acting, after)).astype(bool)
         terminated[list(errors)] = True
         truncated = self.steps >= self.task.length
+        if self.task.delays:
+            self._late.push(after[:, : self._seen.shape[1]])
+        self._see(~renew if self._mode is AutoresetMode.NEXT_STEP else np.ones(self.num_envs, dtype=bool), after)
         if self._mode is AutoresetMode.NEXT_STEP and renew.any():
             errors = {index: why for index, why in errors.items() if not renew[index]}
             rewards[renew], terminated[renew], truncated[renew] = 0.0, False, False
@@ -203,14 +253,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         infos: _Info = {}
         for index, why in errors.items():
             self._add_info(infos, {"error": why}, index)
-        self._observation, self._over = after, terminated | truncated
+        self._values, self._over = after, terminated | truncated
         if self._mode is AutoresetMode.SAME_STEP and self._over.any():
             over, final = self._over.copy(), np.full(self.num_envs, None, dtype=object)
             for ended in np.flatnonzero(over):
-                final[ended] = after[ended].copy()
+                final[ended] = self._seen[ended].copy()
             infos = {"final_obs": final, "_final_obs": over, "final_info": infos, "_final_info": over.copy()}
             self._begin(over, after)
-        return after.copy(), rewards, terminated, truncated, infos
+        return self._seen.copy(), rewards, terminated, truncated, infos
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free the instances, and the FMU if it was opened here."""
@@ -219,48 +269,103 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._own.close()
 
     def _advance(self, actions: _Array, before: _Array) -> tuple[_Array, dict[int, str]]:
-        """Perform a step. Return the observations after it, and the messages of instances whose step failed, by index."""
-        after, values = np.full_like(before, np.nan), actions
+        """Perform a step. Return the values after it, and the messages of instances whose step failed, by index."""
+        read, values = np.full((self.num_envs, len(self._read)), np.nan), actions
         if self.task.to_inputs is not None:
             values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
             if values.shape != (wanted := (self.num_envs, len(self._inputs))):
                 raise ValueError(f"to_inputs must return {wanted}, it returned {values.shape}")
         try:
-            self._instances.advance(self._inputs, values, self.task.step, self._observed, out=after)
+            self._instances.advance(self._inputs, values, self.task.step, self._read, out=read)
         except fmu_run.FmuError:  # All instances have failed.
             if not self._instances.errors:
                 raise
-        failed = ~np.isfinite(after).all(axis=1)
+        after, failed = self._with_goals(read), ~np.isfinite(read).all(axis=1)
         if not failed.any():
             return after, {}
         after[failed], why = before[failed], self._instances.errors
         indices = np.flatnonzero(failed).tolist()
         return after, {index: why.get(index, "an observation is not a finite number") for index in indices}
 
-    def _begin(self, which: _Bools, observation: _Array) -> None:
-        """Begin new episodes of the selected instances, and write their first observations to `observation`."""
-        for name, how in self.task.drawn.items():
-            count = int(which.sum())
-            self._drawn[name][which] = (
-                how(self.np_random, count) if callable(how) else self.np_random.uniform(*how, count)
-            )
+    def _begin(self, which: _Bools, values: _Array) -> None:
+        """Begin new episodes of the selected instances, and write their first values to `values`."""
+        which = which.copy()  # It may be `self._over`, which changes below.
+        indices = np.flatnonzero(which)
+        draws = [*self.task.drawn.values(), *self.task.goals.values()]
+        ranges = np.flatnonzero([not callable(how) for how in draws])
+        if len(ranges):
+            low, high = np.array([draws[column] for column in ranges], dtype=np.float64).T
+            shares = np.array([self.generators[index].random(len(ranges)) for index in indices])
+            self._drawn[np.ix_(indices, ranges)] = low + (high - low) * shares.reshape(-1, len(ranges))
+        for column, how in enumerate(draws):
+            if callable(how):
+                self._drawn[indices, column] = [float(how(self.generators[index])) for index in indices]
+        start = {name: np.ascontiguousarray(self._drawn[:, column]) for column, name in enumerate(self.task.drawn)}
         try:
-            self._instances.reset(which, start=dict(self._drawn))
+            self._instances.reset(which, start=start)
         except fmu_run.FmuError:
             if not self._instances.errors:
                 raise
         for index, why in self._instances.errors.items():
             if which[index]:
-                drawn = ", ".join(f"{name} = {values[index]:g}" for name, values in self._drawn.items())
+                drawn = ", ".join(f"{name} = {column[index]:g}" for name, column in start.items())
                 raise fmu_run.FmuError(f"instance {index} cannot begin an episode with {drawn or 'its start'}: {why}")
-        observation[which] = self._instances.get(self._observed)[which]
+        values[which] = self._with_goals(self._instances.get(self._read))[which]
         self.steps[which], self._over[which] = 0, False
+        self._late.begin(which, values[which, : self._seen.shape[1]])
+        self._late_actions.begin(which, np.zeros(1))
+        self._see(which, values)
+
+    def _with_goals(self, read: _Array) -> _Array:
+        """Insert the goals between the observations and the privileged variables."""
+        if not self.task.goals:
+            return read
+        count = len(self._read) - len(self.task.privileged)
+        return np.hstack([read[:, :count], self._drawn[:, len(self.task.drawn) :], read[:, count:]])
+
+    def _see(self, which: _Bools, values: _Array) -> None:
+        """Update what the agents of the selected instances observe: late and with noise."""
+        exact = values[:, : self._seen.shape[1]]
+        if not (self.task.delays or self.task.noise):
+            self._seen = exact
+            return
+        self._seen[which] = (self._late.read() if self.task.delays else exact)[which]
+        if len(self._noisy):
+            block, indices = self.steps % _BLOCK, np.flatnonzero(which)
+            for index in indices[block[indices] == 0]:
+                self._noise[index] = self.generators[index].standard_normal(self._noise.shape[1:])
+            deviations = np.array(list(self.task.noise.values()))
+            self._seen[np.ix_(indices, self._noisy)] += deviations * self._noise[indices, block[indices]]
 
     def _judged(self, name: str, values: ArrayLike) -> NDArray[Any]:
         judged = np.asarray(values)
         if judged.shape != (self.num_envs,):
             raise ValueError(f"{name} must return ({self.num_envs},), it returned {judged.shape}")
         return judged
+
+
+class _Late:
+    """Values (num_envs, columns) of the last steps, from which each column is read with its delay."""
+
+    def __init__(self, delays: Sequence[int], num_envs: int):
+        self._delays, self._columns, self._now = np.array(delays), np.arange(len(delays)), 0
+        self._ring = np.zeros((max(delays) + 1, num_envs, len(delays)))
+
+    def begin(self, which: _Bools, values: _Array) -> None:
+        """Replace all values of the selected instances, because their episodes begin."""
+        self._ring[:, which] = values
+
+    def push(self, values: _Array) -> None:
+        """Add the values of a step."""
+        self._now = (self._now + 1) % len(self._ring)
+        self._ring[self._now] = values
+
+    def read(self) -> _Array:
+        """Return the late values."""
+        late: _Array = np.ascontiguousarray(
+            self._ring[(self._now - self._delays) % len(self._ring), :, self._columns].T
+        )
+        return late
 
 
 class Env(gymnasium.Env[_Array, _Array]):
@@ -279,7 +384,7 @@ class Env(gymnasium.Env[_Array, _Array]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
         """Begin a new episode."""
         super().reset(seed=seed)
-        self._one.np_random = self.np_random
+        self._one.generators = [self.np_random]
         observation, _ = self._one.reset()
         return observation[0], {}
 
@@ -298,6 +403,29 @@ def _opened(fmu: str | os.PathLike[str] | fmu_run.Fmu | fmu_run.System) -> fmu_r
     if isinstance(fmu, fmu_run.Fmu | fmu_run.System):
         return fmu
     return fmu_run.System(fmu) if os.fspath(fmu).endswith(".ssp") else fmu_run.Fmu(fmu)
+
+
+def _check_sensors(task: Task, actions: Mapping[str, Any], observations: Mapping[str, Any]) -> None:
+    """Raise ValueError for invalid goals, noise or delays."""
+    for what, named, known in (
+        ("noise", task.noise, observations),
+        ("delays", task.delays, {**observations, **actions}),
+    ):
+        if unknown := [name for name in named if name not in known]:
+            raise ValueError(f"{what}: {unknown[0]} is not among {', '.join(known)}")
+    for name in task.goals:
+        if name in observations:
+            raise ValueError(f"goals: {name} is an observation; choose another name")
+    for what, draws in (("drawn", task.drawn), ("goals", task.goals)):
+        for name, how in draws.items():
+            if not callable(how) and not (np.isfinite(how).all() and len(how) == 2 and how[0] <= how[1]):
+                raise ValueError(f"{what}: {name} needs (low, high), low not above high, or a function, not {how}")
+    for name, deviation in task.noise.items():
+        if not (np.isfinite(deviation) and deviation >= 0):
+            raise ValueError(f"noise: {name} needs a finite number of at least 0, not {deviation}")
+    for name, delay in task.delays.items():
+        if not isinstance(delay, int) or delay < 0:
+            raise ValueError(f"delays: {name} needs an integer of at least 0, not {delay!r}")
 
 
 def _bounds(what: str, named: _Named, variables: Mapping[str, fmu_run.Variable]) -> dict[str, tuple[float, float]]:
