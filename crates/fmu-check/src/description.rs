@@ -119,7 +119,27 @@ impl Description {
                 let why = format!("{name} is of type {declared:?}, which is not among the TypeDefinitions");
                 add("description.types", why);
             }
+            if variable.display_unit.is_some() && variable.unit.is_none() {
+                add("description.units", format!("{name} has a displayUnit, but no unit"));
+            }
+            // Otherwise it would be unclear which start value the importer sets.
+            let is_set = |of: &Variable| of.causality == "parameter" && !of.start.is_empty();
+            if let Some(other) = self.aliases(index).find(|other| *other > index)
+                && is_set(variable)
+                && is_set(&self.variables[other])
+            {
+                let other = &self.variables[other].name;
+                add(
+                    "description.references",
+                    format!("{name} and {other} have one reference and a start each"),
+                );
+            }
             wrong.extend(faults(variable));
+        }
+        let independent = self.variables.iter().filter(|of| of.causality == "independent").count();
+        if independent > 1 || independent == 0 && self.standard == Standard::Fmi3 {
+            let why = format!("{independent} variables have the causality independent");
+            wrong.push(("description.independent", why));
         }
         // The reverse is not required: a variable with the attribute `derivative` is listed only if it is a state derivative
         // (section 2.2.8 of FMI 2.0).

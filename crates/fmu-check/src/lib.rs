@@ -7,8 +7,8 @@
 //! twice, and written to the report with the results that show the finding (`reproduce`, `evidence`), from which `replay` executes
 //! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
-//! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `description`,
-//! `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `schedule`,
+//! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `schema`,
+//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `schedule`,
 //! `baseline`, `report`, `replay`.
 
 mod always;
@@ -28,6 +28,7 @@ mod reproduce;
 mod rules;
 mod run;
 mod schedule;
+mod schema;
 mod shrink;
 mod trajectory;
 mod values;
@@ -236,6 +237,7 @@ fn opened(
     if wanted("description") {
         observations.extend(encoding);
         observations.extend(description.wrong.iter().cloned());
+        observations.extend(schema::violation(description.standard, &description.version, text));
     }
     let (setting, without) = setting(options, directory, &description);
     let checker = Checker::new(description, setting, workers, options, begin);

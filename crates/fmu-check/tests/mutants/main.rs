@@ -180,7 +180,7 @@ fn symbol_missing() {
 
 /// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
 #[rustfmt::skip]
-const DESCRIPTIONS: [(u32, &str, &str, &str); 17] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str); 22] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
     (3, "description.combination", r#""input" variability"#, r#""input" initial="calculated" variability"#),
     (3, "description.combination", r#""output" variability="discrete""#, r#""output" variability="continuous""#),
@@ -193,6 +193,11 @@ const DESCRIPTIONS: [(u32, &str, &str, &str); 17] = [
     (2, "description.start", r#"<Real start="2"/>"#, "<Real/>"),
     (2, "description.start", r#"<Real start="2"/>"#, r#"<Real start="1,5"/>"#),
     (2, "description.start", r#"<Boolean/>"#, r#"<Boolean start="True"/>"#),
+    (2, "description.schema", r#"canGetAndSetFMUstate="true""#, r#"canGetAndSetFMUstate="yes""#),
+    (3, "description.schema", "<ModelStructure>", r#"<ModelStructure colour="red">"#),
+    (3, "description.independent", r#"causality="independent""#, r#"causality="local""#),
+    (2, "description.references", r#""spring" valueReference="2""#, r#""spring" valueReference="1""#),
+    (2, "description.units", r#"<Real start="2""#, r#"<Real displayUnit="kg" start="2""#),
     (3, "description.token", r#" instantiationToken="wagon""#, ""),
     (2, "description.empty-token", r#"guid="wagon""#, r#"guid="""#),
     (2, "description.range", r#"<Real start="2""#, r#"<Real min="3" start="2""#),

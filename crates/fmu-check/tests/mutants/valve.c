@@ -30,7 +30,7 @@ typedef int Flag;
 #define SIZES
 #endif
 
-enum { GAIN = 1, LABEL, UNIT, OPEN, STAGE, U, LEVEL, DER_LEVEL, FLOW, COUNT, CURVE, SHARE };
+enum { GAIN = 1, LABEL, UNIT, OPEN, STAGE, U, LEVEL, DER_LEVEL, FLOW, COUNT, CURVE, SHARE, TIME };
 enum { MADE = 1, INITIALIZING = 2, STEPPING = 4, ENDED = 8 };
 enum { OK, DISCARD = 2, ERROR = 3 };
 
@@ -142,6 +142,7 @@ static double get(const State *s, uint32_t vr) {
     case CURVE: return s->curve;
     /* The factor of u depends on the sign of u, which the standard allows for the kind "discrete". */
     case SHARE: return (s->u > 0 ? 2 : 3) * s->u * (IS(late) && s->steps > 3 ? s->open + 1 : 1);
+    case TIME: return s->time;
     default: return NAN;
     }
 }

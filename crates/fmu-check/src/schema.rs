@@ -1,0 +1,67 @@
+//! Compares model descriptions with the XML schemas of the standard.
+
+use crate::rules::Observation;
+use fmi_abi::{Standard, shown};
+use uppsala::xsd::XsdValidator;
+
+/// Schema of an FMI version, in one file.
+const fn schema(standard: Standard) -> &'static str {
+    match standard {
+        Standard::Fmi2 => include_str!("../schema/fmi2.xsd"),
+        Standard::Fmi3 => include_str!("../schema/fmi3.xsd"),
+    }
+}
+
+/// Maximum size of a description that is compared, in bytes, because the comparison of a larger one takes seconds.
+const LARGEST: usize = 20 << 20;
+
+/// Returns the first violation of the schema in a model description of this `fmiVersion`; the others often follow from it. Later
+/// editions of FMI 3 may have more elements, so their descriptions are not compared.
+pub fn violation(standard: Standard, version: &str, text: &str) -> Option<Observation> {
+    if text.len() > LARGEST || !["2.0", "3.0"].contains(&version) {
+        return None;
+    }
+    let validator = uppsala::parse(schema(standard)).and_then(|schema| XsdValidator::from_schema(&schema));
+    // The parser of fmi-abi has accepted the description. This one also limits the depth of its elements.
+    let (validator, document) = (validator.ok()?, uppsala::parse(text).ok()?);
+    let error = validator.validate(&document).into_iter().next()?;
+    let line = error.line.map_or(String::new(), |line| format!("line {line}: "));
+    let message = error.message.replace(" (no wildcard permits additional attributes)", "");
+    Some(("description.schema", format!("{line}{}", shown(&message))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::violation;
+    use fmi_abi::Standard;
+
+    fn of(changed: [&str; 2]) -> Option<String> {
+        let text = include_str!("../tests/mutants/wagon2.xml");
+        assert!(text.contains(changed[0]), "{}", changed[0]);
+        let text = text.replacen(changed[0], changed[1], 1);
+        violation(Standard::Fmi2, "2.0", &text).map(|(_, why)| why)
+    }
+
+    #[test]
+    fn descriptions_are_valid() {
+        assert_eq!(of(["mass", "mass"]), None);
+        let text = include_str!("../tests/mutants/wagon3.xml");
+        assert_eq!(violation(Standard::Fmi3, "3.0", text), None);
+    }
+
+    #[test]
+    fn a_violation_names_its_line() {
+        let boolean = of([r#"canGetAndSetFMUstate="true""#, r#"canGetAndSetFMUstate="yes""#]);
+        assert_eq!(boolean.as_deref(), Some("line 3: 'yes' is not a valid boolean"));
+        for changed in [
+            [r#"numberOfEventIndicators="1""#, r#"numberOfEventIndicators="-1""#],
+            ["<Outputs>", "<Exits/><Outputs>"],
+            [r#"<Real start="2"/>"#, r#"<Real start="2" colour="red"/>"#],
+            [r#"<Real start="2"/>"#, r#"<Real start="1,5"/>"#],
+            ["<DefaultExperiment", "<ModelVariables/><DefaultExperiment"],
+            [r#" modelName="wagon""#, ""],
+        ] {
+            assert!(of(changed).is_some(), "{changed:?}");
+        }
+    }
+}
