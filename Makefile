@@ -53,7 +53,7 @@ ADD_WEBASSEMBLY = $(call add_target,$(WEBASSEMBLY))
 # Directory of the compiled programs that build FMUs. If empty, cargo compiles them.
 PROGRAMS ?=
 BUILD_FMU = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --bin build_fmu --)
-BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) -p prw_controller --bin build_controller --)
+BUILD_CONTROLLER = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_fmu_controller,$(CARGO) run $(LOCKED) -p prw_controller --bin build_fmu_controller --)
 BUILD_CLOSED_LOOP = $(NO_JOBS) $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) dev/tools/has_page.py $(FMU)
@@ -234,7 +234,7 @@ closed-loop-fmus: fmu
 	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p fmu-package --bin cargo-fmu)
 	@rm -rf target/lag && $(NO_JOBS) target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
 	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models $(NO_JOBS) ../debug/cargo-fmu fmu build --out ../fmu
-	@cd crates/prw-motor && $(NO_JOBS) ../../target/debug/cargo-fmu fmu build --no-page --out ../../target/fmu
+	@cd examples/motor && $(NO_JOBS) ../../target/debug/cargo-fmu fmu build --no-page --out ../../target/fmu
 
 closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) dev/tools closed-loop $(ARGS)
@@ -321,7 +321,7 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@touch $@
 
 FMU_RUN := Cargo.lock $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
-  src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
+  src/*.rs src/*/*.rs src/*/*/*.rs python/src/*.rs python/fmu_run/*)\
   $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
 
 # In a separate target directory, so that it need not wait until cargo has compiled the FMU.

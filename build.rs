@@ -1,8 +1,16 @@
 //! Compiles Table 1 of the paper, `modelDescription/parameters.json`, into the library.
 
-use prw_parameters::file;
 use std::path::Path;
 use std::{env, fs};
+
+// The module that the library contains, and the reader of parameter files, which it does not contain.
+#[allow(dead_code)]
+#[macro_use]
+#[path = "src/parameters/mod.rs"]
+mod parameters;
+
+#[path = "src/parameters/file.rs"]
+mod file;
 
 fn main() {
     if let Err(error) = run() {

@@ -7,6 +7,16 @@ use fmu_package::{BuildOptions, Builder, Page, Sources, Terminal, directory_of};
 use std::path::{PathBuf, absolute};
 use std::process::ExitCode;
 
+// The module that the library contains, and the reader of parameter files, which it does not contain.
+#[allow(dead_code)]
+#[macro_use]
+#[path = "src/parameters/mod.rs"]
+mod parameters;
+
+#[allow(dead_code)]
+#[path = "src/parameters/file.rs"]
+mod file;
+
 const ABOUT: &str = "Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and \
                      target/fmu/fmi3/prw_testbed.fmu for FMI 3.0";
 const EXAMPLES: &str = "Examples (after `cargo run --bin build_fmu --`):
@@ -35,7 +45,7 @@ fn run(matches: &ArgMatches) -> Result<()> {
         None => None,
     };
     let start = match &other {
-        Some(file) => prw_parameters::file::read(file).map_err(Error::msg)?.start_values(),
+        Some(path) => file::read(path).map_err(Error::msg)?.start_values(),
         // The library is compiled with Table 1.
         None => Vec::new(),
     };

@@ -58,6 +58,7 @@ pub mod instant;
 pub mod motor;
 pub mod number;
 pub mod pair;
+pub mod parameters;
 pub mod propagator;
 pub mod start;
 pub mod state_space;
@@ -66,7 +67,6 @@ pub mod variables;
 
 pub use fmu::TestbedFmu;
 pub use parameters::Parameters;
-pub use prw_parameters as parameters;
 pub use testbed::Testbed;
 
 /// The built-in parameters, Table 1. The build script reads them from `modelDescription/parameters.json`.

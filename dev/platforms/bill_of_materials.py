@@ -46,7 +46,7 @@ class Product:
 
 LICENCES = Path("modelDescription", "licenses")
 FMU = Product("FMU", MODEL, MODEL, ROOT / LICENCES)
-CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "crates" / "prw-controller" / LICENCES)
+CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "examples" / "controller" / LICENCES)
 WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
 PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
 

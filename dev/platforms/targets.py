@@ -12,7 +12,7 @@ MODEL = "prw_testbed"
 CONTROLLER = "prw_controller"
 MODELS = (MODEL, CONTROLLER)
 #: The program that packs the FMUs of a model, and the package of the program.
-PACKERS = {MODEL: ("build_fmu", "build_fmu"), CONTROLLER: ("build_controller", CONTROLLER)}
+PACKERS = {MODEL: ("build_fmu", "build_fmu"), CONTROLLER: ("build_fmu_controller", CONTROLLER)}
 
 #: The glibc of Enterprise Linux 7, the oldest supported system.
 GLIBC = "2.17"

@@ -18,16 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
 #: Crates that are linked into the FMU or that build it.
-OF_THE_FMU = {
-    "build_fmu",
-    "prw_testbed",
-    "fmi-abi",
-    "fmi-client",
-    "fmu-export",
-    "fmu-package",
-    "prw_page",
-    "prw_parameters",
-}
+OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmi-client", "fmu-export", "fmu-package", "prw_page"}
 #: Packages without unit tests in Rust.
 UNTESTED = {"build_fmu", "fmu-run-python"}
 #: Directory of the FMU that is built here. It has no page, so it must not replace the FMU of `make fmu`.

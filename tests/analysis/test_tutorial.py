@@ -36,7 +36,7 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
                 continue  # The files exist already, because this test runs after `make` has built them.
             command = line.split()
             if command[0] == "cargo":
-                # The description shows that the parameters arrive; crates/build-fmu/tests/packaging.rs compiles such FMUs.
+                # The description shows that the parameters arrive; dev/build_fmu/tests/packaging.rs compiles such FMUs.
                 assert line.startswith("cargo run --release --bin build_fmu -- ")
                 command = [*program("build_fmu"), *command[command.index("--") + 1 :], "--describe"]
                 command = [str(tmp_path / w) if w.startswith("out/") or w == "mine" else w for w in command]

@@ -120,7 +120,7 @@ def test_model_exchange_needs_no_communication_points():
 def test_the_program_in_the_readme(monkeypatch):
     built("prw_motor.fmu")
     monkeypatch.chdir(ROOT)
-    readme = (ROOT / "crates/prw-motor/README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "examples/motor/README.md").read_text(encoding="utf-8")
     (program,) = re.findall(r"^```python\n(.*?)^```$", readme, flags=re.M | re.S)
     found: dict = {}
     exec(program, found)

@@ -45,7 +45,7 @@ def found(fmu):
     return results(fmu)
 
 
-@pytest.mark.parametrize("name, sources", [("testbed", "."), ("controller", "crates/prw-controller")])
+@pytest.mark.parametrize("name, sources", [("testbed", "."), ("controller", "examples/controller")])
 def test_the_fmu_contains_the_icons(name, sources):
     path = built(f"prw_{name}.fmu")
     with zipfile.ZipFile(path) as archive:

@@ -13,7 +13,7 @@ import pytest
 from built import ROOT
 
 #: Options of cargo test and of its test programs that have a value.
-WITH_VALUE = ("-p", "--package", "--profile", "--test", "--skip")
+WITH_VALUE = ("-p", "--package", "--bin", "--profile", "--test", "--skip")
 #: Begin of an item whose name contains the word.
 CARGO_ITEM, PYTEST_ITEM = r"\b(fn|mod) \w*{}", r"\bdef test_\w*{}"
 ROBUSTNESS = ROOT / "docs/robustness.md"
@@ -79,8 +79,8 @@ def test_filters_are_read() -> None:
 
 
 def test_only_sources_of_the_tested_packages_are_searched() -> None:
-    named = "fn invalid_files_have_an_error"
-    assert named in sources_tested_by("cargo test -p prw_parameters invalid_files")
+    named = "fn elements_form_arrays"
+    assert named in sources_tested_by("cargo test -p fmu-run elements_form_arrays")
     for command in ("cargo test", "cargo test --test fmu"):
         rust = sources_tested_by(command)
         assert "fn loading_and_unloading_leaks_nothing" in rust and named not in rust

@@ -11,7 +11,7 @@ from prw.errors import UserError
 #: Relative to the root of the repository: the sources of the pages, and the model descriptions of testbed and controller.
 SOURCES = Path("docs/fmu-page")
 TESTBED = Path("modelDescription/modelDescription.xml")
-CONTROLLER = Path("crates/prw-controller") / TESTBED
+CONTROLLER = Path("examples/controller") / TESTBED
 
 
 class Table(NamedTuple):

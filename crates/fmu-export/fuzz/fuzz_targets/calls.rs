@@ -14,7 +14,7 @@ use models::*;
 /// Test models in FMI 2.0 and FMI 3.0. Add new models at the end, because the last byte of each input in
 /// `corpus.zip` selects a model by its index.
 ///
-/// Any exported model can be added, for example `run::<Importer, prw_testbed::TestbedFmu>` with that crate as a dependency.
+/// Any exported model can be added, for example `run::<Importer, my_model::MyModel>` with that crate as a dependency.
 const MODELS: [RunBytes; 16] = [
     run::<Importer, Oscillator>,
     run::<Importer, Ball>,

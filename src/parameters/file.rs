@@ -4,7 +4,7 @@
 //! This module uses no derive macros, because every build of the library begins by compiling it, and derive macros would take
 //! longer to compile than everything else in the build script.
 
-use crate::{Integer, Parameters, Real};
+use crate::parameters::{Integer, Parameters, Real};
 use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use serde_json::Value;
 use std::f64::consts::PI;
@@ -164,7 +164,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
 mod tests {
     use super::{parse, read, rust_expression};
 
-    const TABLE_1: &str = include_str!("../../../modelDescription/parameters.json");
+    const TABLE_1: &str = include_str!("../../modelDescription/parameters.json");
 
     /// Returns the line of Table 1 that contains this key.
     fn line(key: &str) -> &'static str {

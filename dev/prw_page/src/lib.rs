@@ -45,7 +45,7 @@ pub fn testbed(description: &str) -> Result<String> {
 /// When a source is missing or faulty; the message names it.
 ///
 /// ```
-/// let description = std::fs::read_to_string("../prw-controller/modelDescription/modelDescription.xml").unwrap();
+/// let description = std::fs::read_to_string("../../examples/controller/modelDescription/modelDescription.xml").unwrap();
 /// assert!(prw_page::controller(&description).unwrap().contains("<td><code>pitch_ref</code></td><td>rad</td>"));
 /// ```
 pub fn controller(description: &str) -> Result<String> {

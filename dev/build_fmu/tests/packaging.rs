@@ -313,7 +313,7 @@ fn a_copied_clone_builds_in_its_own_place() {
     let copy = directory.path().join("copy");
     fs::create_dir(&copy).unwrap();
     let sources = ["Cargo.toml", "Cargo.lock", "build.rs", "build_fmu.rs", "LICENSE-APACHE", "LICENSE-MIT"];
-    let directories = ["crates", "dev", "docs", "modelDescription", "src", "tests"];
+    let directories = ["crates", "dev", "docs", "examples", "modelDescription", "src", "tests"];
     let copied = Command::new("cp")
         .args(["-r", "--no-dereference"])
         .args(sources.iter().chain(&directories))

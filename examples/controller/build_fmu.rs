@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
 #[derive(Parser)]
-#[command(override_usage = "cargo run -p prw_controller --bin build_controller [-- OPTIONS]")]
+#[command(override_usage = "cargo fmu build -p prw_controller [OPTIONS]")]
 struct Options {
     #[command(flatten)]
     build: BuildOptions,
@@ -21,7 +21,7 @@ fn main() -> ExitCode {
 
 fn builder(directory: PathBuf) -> Builder {
     Builder {
-        command: "cargo run -p prw_controller --bin build_controller --",
+        command: "cargo fmu build -p prw_controller",
         sources: Sources {
             licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
             ..Sources::of_package(&directory)

@@ -1,8 +1,8 @@
 //! The parameters of the testbed (Table 1 of the paper), in SI units.
 //!
-//! They are in a separate package because three parts need them: the model, its build script, which compiles the values
-//! into the library, and `build_fmu`, which writes them into the model description. The file with the values is read only
-//! while an FMU is built, by the module `file`.
+//! Three programs compile this module: the model, its build script, which compiles the values into the library, and `build_fmu`, which
+//! writes them into the model description. The file with the values is read only while an FMU is built, so only the last two compile
+//! `file.rs`, which reads it.
 
 use std::fmt;
 
@@ -141,6 +141,3 @@ impl fmt::Display for InvalidParameter {
 }
 
 impl std::error::Error for InvalidParameter {}
-
-#[cfg(feature = "file")]
-pub mod file;
