@@ -122,7 +122,7 @@ fn compare_interfaces(fmu: &Path, from: &str) {
     };
     // SAFETY: the FMU of these tests.
     #[allow(unsafe_code)]
-    let fmu = unsafe { Fmu::open(fmu) }.unwrap();
+    let fmu = unsafe { Fmu::open(fmu) }.unwrap().system().clone();
     let time: Vec<_> = (0..=500).map(|k| end * f64::from(k) / 500.0).collect();
     let run = |interface| {
         let integration = match interface {

@@ -4,7 +4,7 @@
 //! count_runs FMU USE REPETITIONS
 //! ```
 
-use fmu_run::{Batch, Fmu, Measure, Setup, Start, Trajectory, Watch};
+use fmu_run::{Batch, Fmu, Measure, Setup, Start, System, Trajectory, Watch};
 use std::env;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), fmu_run::Error> {
     let count: usize = count.parse().expect("REPETITIONS must be a number");
     let open = || {
         // SAFETY: the FMU of this repository.
-        unsafe { Fmu::open(Path::new(path)) }
+        unsafe { Fmu::open(Path::new(path)) }.map(|fmu| fmu.system().clone())
     };
     let fmu = open()?;
     match name.as_str() {
@@ -42,7 +42,7 @@ fn main() -> Result<(), fmu_run::Error> {
 }
 
 /// Runs a batch in one thread, with `samples` communication points at intervals of 1 ms.
-fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(), fmu_run::Error> {
+fn run(fmu: &System, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(), fmu_run::Error> {
     let time: Vec<f64> = (0..samples).map(|k| f64::from(k) * 1e-3).collect();
     let wave: Vec<f64> = time.iter().map(|t| 0.1 * (30.0 * t).sin()).collect();
     let stiffness: Vec<f64> = (0..runs).map(|run| 60.0 + run as f64).collect();
@@ -62,7 +62,7 @@ fn run(fmu: &Fmu, samples: u32, runs: usize, measures: Vec<Measure>) -> Result<(
 }
 
 /// Advances 64 stateful instances by this number of steps, in one thread.
-fn instances(fmu: &Fmu, steps: usize) -> Result<(), fmu_run::Error> {
+fn instances(fmu: &System, steps: usize) -> Result<(), fmu_run::Error> {
     let mut wrists = fmu.instances(&Setup { count: 64, ..Setup::default() })?;
     let (motors, outputs) = (fmu.select(&MOTORS)?, fmu.select(&OUTPUTS)?);
     let (mut angles, mut read) = ([0.0; 128], [0.0; 256]);

@@ -229,7 +229,7 @@ fn every_variant_has_a_separate_guid() {
         #[allow(unsafe_code)]
         let fmu = unsafe { fmu_run::Fmu::open(&out) }.unwrap();
         let batch = Batch { time: &[0.0, 1e-3], outputs: vec!["k1"], every: Some(1), ..Batch::default() };
-        fmu.run(&batch, &Watch::default()).unwrap().trajectories[0]
+        fmu.system().run(&batch, &Watch::default()).unwrap().trajectories[0]
     };
     assert_eq!(all.each_ref().map(|(_, fmu)| k1(fmu)), [BUILT_IN.k1, 99.5, 99.5_f64.next_up(), BUILT_IN.k1]);
 }

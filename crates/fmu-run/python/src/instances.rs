@@ -130,7 +130,7 @@ impl Instances {
         let threads = arguments::count("threads", threads.as_ref())?;
         let start_time = finite("start_time", start_time)?;
         let stop_time = stop_time.map(|time| finite("stop_time", &time)).transpose()?;
-        let (system, start) = Start::configured(&*loaded.model()?, start.as_ref())?;
+        let (system, start) = Start::configured(loaded.model()?.system(), start.as_ref())?;
         let log = Log::of(log.as_ref())?;
         let setup = Setup {
             interface,

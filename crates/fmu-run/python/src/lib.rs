@@ -19,7 +19,6 @@ use pyo3::types::{PyDict, PyTuple};
 use signals::Signals;
 use start::Start;
 use std::collections::BTreeMap;
-use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 
 create_exception!(
@@ -39,12 +38,10 @@ enum Model {
     System(System),
 }
 
-impl Deref for Model {
-    type Target = System;
-
-    fn deref(&self) -> &System {
+impl Model {
+    fn system(&self) -> &System {
         match self {
-            Self::Fmu(fmu) => fmu,
+            Self::Fmu(fmu) => fmu.system(),
             Self::System(system) => system,
         }
     }
@@ -143,7 +140,7 @@ impl Loaded {
         let model = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         py.detach(|| {
             if let Some(model) = &model {
-                model.release();
+                model.system().release();
             }
             drop(model);
         });
@@ -156,7 +153,7 @@ impl Loaded {
     /// Returns factor and offset of a conversion: value in `unit` = factor * value in the variable's unit + offset.
     fn display_unit(&self, name: &Bound<'_, PyAny>, unit: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
         let (name, unit) = (arguments::text("name", name)?, arguments::text("unit", unit)?);
-        arguments::display_unit(&*self.model()?, &name, &unit)
+        arguments::display_unit(self.model()?.system(), &name, &unit)
     }
 
     fn about(&self) -> PyResult<About> {
@@ -187,7 +184,8 @@ impl Loaded {
 
     /// Returns the name, the stages of the connections, and the stop time of a system.
     fn about_system(&self) -> PyResult<(String, Stages, Option<f64>)> {
-        let system = self.model()?;
+        let model = self.model()?;
+        let system = model.system();
         let stages = system
             .stages()
             .into_iter()
@@ -204,7 +202,7 @@ impl Loaded {
                 [start, unit, display_unit].map(|text| text.map(|text| text.to_string()));
             (name, base.to_string(), causality, variability, start, unit, description, min, max, display_unit)
         };
-        Ok(self.model()?.variables().map(describe).collect())
+        Ok(self.model()?.system().variables().map(describe).collect())
     }
 
     /// Performs the runs, and meanwhile calls `progress(done, runs)`. After Ctrl-C, all runs stop after their current step.
@@ -229,7 +227,7 @@ impl Loaded {
         tolerances: [Option<Bound<'py, PyAny>>; 3],
         events: Bound<'py, PyAny>,
     ) -> PyResult<Results<'py>> {
-        let (model, start) = Start::configured(&*self.model()?, start.as_ref())?;
+        let (model, start) = Start::configured(self.model()?.system(), start.as_ref())?;
         let log = Log::of(log.as_ref())?;
         let time = times(&time)?;
         let measures = arguments::names("measures", &measures)?;

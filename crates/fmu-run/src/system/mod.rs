@@ -27,7 +27,6 @@ use fmi_abi::{BaseType, Interface, shown};
 pub(crate) use order::Exchange;
 pub use order::Order;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 #[cfg(feature = "write")]
@@ -193,8 +192,9 @@ impl System {
     /// # fn main() -> Result<(), fmu_run::Error> {
     /// # // SAFETY: the library of a trusted FMU.
     /// let fmu = unsafe { fmu_run::Fmu::open("rod.fmu".as_ref()) }?;
-    /// if let Some(temperatures) = fmu.array("T") {
-    ///     println!("{:?} {:?}", temperatures.sizes, fmu.select(&temperatures.names)?);
+    /// let system = fmu.system();
+    /// if let Some(temperatures) = system.array("T") {
+    ///     println!("{:?} {:?}", temperatures.sizes, system.select(&temperatures.names)?);
     /// }
     /// # Ok(())
     /// # }
@@ -424,17 +424,13 @@ impl Fmu {
         &self.loaded().description
     }
 
+    /// Returns the system with this FMU as its only component. It has the functions for variables, runs and instances.
+    pub fn system(&self) -> &System {
+        &self.0
+    }
+
     pub(crate) fn loaded(&self) -> &Arc<Loaded> {
         &self.0.components()[0].fmu
-    }
-}
-
-/// Gives access to the functions of the [`System`]: variables, runs, instances.
-impl Deref for Fmu {
-    type Target = System;
-
-    fn deref(&self) -> &System {
-        &self.0
     }
 }
 

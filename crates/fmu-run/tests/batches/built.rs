@@ -1,6 +1,6 @@
 //! Compiles and packs the FMU of `resets.c`.
 
-use fmu_run::Fmu;
+use fmu_run::{Fmu, System};
 use fmu_test_kit::c_programs::headers;
 use std::fs::File;
 use std::io::Write;
@@ -28,7 +28,7 @@ const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 /// The FMU of `resets.c` with one of its manners, and the directory with its record: a file to which the FMU writes when an
 /// instance is created, reset or freed.
 pub struct Recorded {
-    pub fmu: Option<Fmu>,
+    pub fmu: Option<System>,
     directory: TempDir,
 }
 
@@ -68,11 +68,11 @@ impl Recorded {
         }
         archive.finish().unwrap();
         // SAFETY: the FMU of these tests.
-        let fmu = unsafe { Fmu::open(&path) }.unwrap();
+        let fmu = unsafe { Fmu::open(&path) }.unwrap().system().clone();
         Self { fmu: Some(fmu), directory }
     }
 
-    pub fn fmu(&self) -> &Fmu {
+    pub fn fmu(&self) -> &System {
         self.fmu.as_ref().unwrap()
     }
 

@@ -1,6 +1,6 @@
 //! Compiles and packs the FMUs of `models.c`.
 
-use fmu_run::{Fmu, Standard};
+use fmu_run::{Fmu, Standard, System};
 use fmu_test_kit::c_programs::headers;
 use std::fs::File;
 use std::io::Write;
@@ -104,12 +104,12 @@ fn description3(model: &str, attributes: &str) -> String {
 }
 
 /// Opens a model.
-pub fn opened(model: &str, standard: Standard) -> Fmu {
+pub fn opened(model: &str, standard: Standard) -> System {
     opened_with(model, standard, "")
 }
 
 /// Opens a model and adds attributes to its element ModelExchange.
-pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> Fmu {
+pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> System {
     let (xml, platform) = match standard {
         Standard::Fmi2 => (description2(model, attributes), "linux64"),
         Standard::Fmi3 => (description3(model, attributes), "x86_64-linux"),
@@ -127,5 +127,5 @@ pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> Fmu {
     }
     archive.finish().unwrap();
     // SAFETY: the FMU of these tests.
-    unsafe { Fmu::open(&path) }.unwrap()
+    unsafe { Fmu::open(&path) }.unwrap().system().clone()
 }

@@ -8,7 +8,7 @@ mod faults;
 mod inputs;
 
 use built::{opened, opened_with};
-use fmu_run::{Batch, Fmu, Integration, Runs, Solver, Standard, Start, Trajectory, Watch};
+use fmu_run::{Batch, Integration, Runs, Solver, Standard, Start, System, Trajectory, Watch};
 
 const VERSIONS: [Standard; 2] = [Standard::Fmi2, Standard::Fmi3];
 const SOLVERS: [Solver; 4] = [Solver::Auto, Solver::Dopri5, Solver::Dop853, Solver::Bdf];
@@ -22,7 +22,7 @@ fn tight(solver: Solver) -> Integration {
 }
 
 /// Runs an FMU and stores y at all times.
-fn run(fmu: &Fmu, time: &[f64], batch: Batch) -> Runs {
+fn run(fmu: &System, time: &[f64], batch: Batch) -> Runs {
     let batch = Batch { time, outputs: vec!["y"], every: Some(1), ..batch };
     fmu.run(&batch, &Watch::default()).unwrap()
 }

@@ -1,6 +1,6 @@
 //! Compiles and packs the FMUs of `foreign.c`.
 
-use fmu_run::{Fmu, Standard};
+use fmu_run::{Fmu, Standard, System};
 use fmu_test_kit::c_programs::headers;
 use std::fs::File;
 use std::io::Write;
@@ -75,8 +75,8 @@ pub fn packed(path: &Path, entries: impl IntoIterator<Item = (String, Vec<u8>)>)
 }
 
 /// Packs and opens the FMU with this manner.
-pub fn opened(manner: &str, standard: Standard) -> Fmu {
-    opened_with(manner, standard, &[])
+pub fn opened(manner: &str, standard: Standard) -> System {
+    opened_with(manner, standard, &[]).system().clone()
 }
 
 /// Packs and opens the FMU with this manner and these replacements in its model description.

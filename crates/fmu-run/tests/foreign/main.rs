@@ -20,7 +20,7 @@ fn times() -> Vec<f64> {
 }
 
 /// Runs an FMU with u = 1 for 1 s. Returns y at the end, or the error.
-fn end(fmu: &Fmu) -> Result<f64, String> {
+fn end(fmu: &System) -> Result<f64, String> {
     let time = times();
     let batch = Batch {
         time: &time,
@@ -256,7 +256,7 @@ fn resources_are_found_under_any_path() {
         let directory = tempfile::Builder::new().prefix("a b%20 \u{e4}#").tempdir().unwrap();
         let path = built("resources", standard, directory.path(), &[]);
         // SAFETY: the FMU of this test.
-        let fmu = unsafe { Fmu::open(&path) }.unwrap();
+        let fmu = unsafe { Fmu::open(&path) }.unwrap().system().clone();
         assert_eq!(end(&fmu), Ok(3.5), "{standard}");
     }
 }
@@ -283,7 +283,7 @@ fn units_of_differences_have_no_offset() {
         let close = if standard == Standard::Fmi2 { "/>" } else { "" };
         let list = format!("{unit}<TypeDefinitions>{types}</TypeDefinitions><DefaultExperiment");
         let changes = [("<DefaultExperiment", &*list), (variable, &format!("{start} {own}{close}"))];
-        opened_with("plain", standard, &changes).display_unit("u", "degC").unwrap()
+        opened_with("plain", standard, &changes).system().display_unit("u", "degC").unwrap()
     };
     for standard in VERSIONS {
         let relative = "relativeQuantity=\"true\"";
@@ -298,7 +298,7 @@ fn units_of_differences_have_no_offset() {
 fn steps_have_the_same_size_if_the_fmu_needs_it() {
     let changes = [("canHandleVariableCommunicationStepSize=\"true\"", "")];
     for standard in VERSIONS {
-        let fmu = opened_with("plain", standard, &changes);
+        let fmu = opened_with("plain", standard, &changes).system().clone();
         assert_eq!(end(&fmu).map(|y| (y * 1e9).round()), Ok(1e9), "the times differ only by rounding errors");
         let batch = Batch { time: &[0.0, 0.1, 0.3, 0.35, 1.0], outputs: vec!["y"], ..Batch::default() };
         let why = fmu.run(&batch, &Watch::default()).unwrap_err().to_string();
@@ -344,7 +344,7 @@ fn value_references_are_unique_only_within_a_type() {
 fn values_fit_their_variables() {
     let more = "<Float32 name=\"single\" valueReference=\"51\" causality=\"input\" start=\"0\"/>\
         <Enumeration name=\"choice\" valueReference=\"9\" causality=\"input\" start=\"1\"/></ModelVariables>";
-    let fmu = opened_with("plain", Standard::Fmi3, &[("</ModelVariables>", more)]);
+    let fmu = opened_with("plain", Standard::Fmi3, &[("</ModelVariables>", more)]).system().clone();
     let with = |start| fmu.instances(&Setup { start, ..Setup::default() });
     let mut one = with(vec![("choice", Start::Same(5e9))]).unwrap();
     let choice = fmu.select(&["choice"]).unwrap();

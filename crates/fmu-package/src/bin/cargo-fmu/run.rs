@@ -8,7 +8,9 @@ use crate::results::{Column, write_table};
 use anyhow::{Context, Result, ensure};
 use fmu_package::terminal::{fmi_version, short};
 use fmu_package::{BuildOptions, Standard};
-use fmu_run::{BaseType, Batch, Description, Fmu, Logged, Runs, Start, Status, Value, Variable, Watch};
+use fmu_run::{
+    BaseType, Batch, Description, Fmu, Logged, Runs, Start, Status, System, Value, Variable, Watch,
+};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -173,7 +175,7 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let starts = options.set.iter().map(|(name, value)| starts(description, name, value));
     let starts = starts.collect::<Result<Vec<_>>>()?.concat();
     let mut time = times(options, description, table.as_ref())?;
-    let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
+    let (runs, watch) = follow(fmu.system(), &time, table.as_ref(), &starts, &shown)?;
     let ended = watch.ended().pop();
     let failed = ended.is_none() && !runs.errors.is_empty();
     for (_, reason) in runs.errors.iter().filter(|_| failed) {
@@ -237,7 +239,7 @@ fn columns<'a>(
 
 /// Runs the FMU over these times. Returns the results, and the watch that has collected the messages of the FMU.
 fn follow(
-    fmu: &Fmu,
+    fmu: &System,
     time: &[f64],
     table: Option<&Table>,
     starts: &[(String, Value)],
