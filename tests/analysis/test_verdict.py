@@ -82,7 +82,7 @@ def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
 def test_a_faulty_column_is_named(experiment, fmu, fault):
     change, channel, reported = FAULTY_COLUMNS[fault]
     columns = recording(experiment)
-    found = prw.identify({**columns, **change(columns)}, starts=1, fmu=fmu)
+    found = prw.identify({**columns, **change(columns)}, degrees=False, starts=1, fmu=fmu)
     assert channel in {misfit.channel for misfit in found.verdict.misfits}, found.misfits
     assert reported in found.diagnosis[0], found.diagnosis
 

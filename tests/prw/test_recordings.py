@@ -41,7 +41,7 @@ BAD = {
         b"time,theta1,omega1\n0,1,1\n1,1,1\n",
         "row 1: column theta2 is missing; the header has time, theta1, omega1",
     ),
-    "no header": (b"0,1,1\n1,1,1\n", "row 1: column time is missing"),
+    "no header": (b"0,1,1\n1,1,1\n", "row 1: there is no header; it must have the columns time, theta1, theta2"),
     "half the rates": (
         b"time,theta1,theta2,omega2\n0,1,1,1\n1,1,1,1\n",
         "row 1: column omega1 is missing; give both omega1 and omega2, or neither",
@@ -69,7 +69,12 @@ BAD = {
     ),
     "latin-1": ("time,theta1,theta2,größe\n0,1,1,1\n".encode("latin-1"), "row 1: not UTF-8 text"),
     "latin-1 later": ("time,theta1,theta2,x\n0,1,1,1\n1,1,1,ß\n".encode("latin-1"), "row 3: not UTF-8 text"),
-    "utf-16 without its mark": ("time,theta1,ö\n0,1,1\n".encode("utf-16-le"), "row 1: not UTF-8 text"),
+    "utf-16 without its mark": (
+        "time,theta1,ö\n0,1,1\n".encode("utf-16-le"),
+        "this is not a text file, or it is UTF-16 without its byte order mark",
+    ),
+    "a picture": (b"GIF89a\xd2\0\xff", "this is not a text file"),
+    "prose": (b"Dear reader, this\n", "row 1: this is not a table of motor angles"),
     "nul": (b"time,theta1,theta2\n0,1,1\n1,\0,1\n", "row 3"),
     "decimal comma": (b"time\ttheta1\ttheta2\n0\t1\t1\n0,1\t1\t1\n", "row 3, column time: '0,1' is not a number"),
     "wrong unit of torque": (
@@ -146,7 +151,7 @@ def test_numbers_of_many_rows(tmp_path: Path, delimiter: Any, end: Any) -> None:
         path.write_bytes(end.join(delimiter.join(row) for row in [header, *cells, []]).encode())
 
     write()
-    recording = read(path)
+    recording = read(path, degrees=False)
     expected = np.array([[float(cell.replace(",", ".") or "nan") for cell in row[2:]] for row in cells])
     np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
     np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
@@ -228,7 +233,10 @@ def test_degrees(file: Any) -> None:
     assert motion.omega is not None
     np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
     assert motion.notes == []
-    assert any("if it is in degrees, call it theta1 [deg]" in note for note in read_motion(path).notes)
+    # Without a unit, an implausible motion is rejected, because nobody knows whether it is in degrees or in radians.
+    with pytest.raises(UserError, match=r"theta1 reaches 43 rad .* add --degrees or --radians"):
+        read_motion(path)
+    assert any("theta1 reaches 43 rad" in note for note in read_motion(path, degrees=False).notes)
 
 
 @pytest.mark.parametrize(

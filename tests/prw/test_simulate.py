@@ -79,7 +79,7 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
     entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
     (tmp_path / "mine.json").write_text(json.dumps(entries))
     (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))
-    (tmp_path / "good.csv").write_text(GOOD.replace("0.002,0.1", "0.002,0.3") + "0.01,0.3,0.2\n")
+    (tmp_path / "good.csv").write_text(GOOD.replace("0.002,0.1", "0.002,0.12") + "0.01,0.12,0.2\n")
     found = {}
     for name, arguments in {
         "file": ["--parameters", "mine.json"],
@@ -113,6 +113,11 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
     ]:
         result = prw("simulate", *arguments)
         assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1, result
+    for arguments, hint in [(["--k1", "100"], "; a parameter is set by --set k1=100\n"), (["--fum", "my.fmu"], "")]:
+        result = prw("simulate", *arguments)
+        assert result.returncode == 2 and result.stderr.endswith(
+            f"unrecognized arguments: {arguments[0]}{hint or chr(10)}"
+        )
 
 
 def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
@@ -125,7 +130,7 @@ def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
 
     result = run("simulate")
     assert result.returncode == 0 and result.stderr == "", result.stderr
-    assert "no figure   matplotlib missing; install with: pip install matplotlib" in result.stdout
+    assert "no figure   matplotlib missing; install with: make study" in result.stdout
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["fig4.csv"] and "next        look at out" in result.stdout
     result = run("check", "out/fig4.csv", "--experiment", "closed_loop")
     assert result.returncode == 1 and "for a figure of both, matplotlib missing; install" in result.stderr
@@ -161,13 +166,13 @@ def test_other_errors(prw: Any, tmp_path: Path) -> None:
         (["--input", "."], "cannot be read (Is a directory)"),
         (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU\n"),
         (["--input", "good.csv", "--fmu", "no.fmu"], "no.fmu: cannot be loaded"),
-        (["--degrees"], "--degrees belongs to a recording"),
+        (["--radians"], "--degrees and --radians belong to a recording"),
     ]:
         result = prw("simulate", *arguments, with_fmu=False)
         assert result.returncode == 1 and message in result.stderr, result.stderr
         assert result.stderr.count("\n") == 1 and result.stdout == ""
     (tmp_path / "huge.csv").write_text("time,theta1,theta2\n0,0,0\n1e-3,1e308,0\n2e-3,-1e308,0\n")
-    result = prw("simulate", "--input", "huge.csv")
+    result = prw("simulate", "--input", "huge.csv", "--radians")
     assert result.returncode == 1 and "the FMU stopped at 0.001 s: " in result.stderr
     assert result.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
     result = prw("simulate", "--input", "good.csv", "--out", "taken")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
 import threading
@@ -46,7 +47,9 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
     arguments = argparse.Namespace(options={})
     before = _end_on_sigterm()
     try:
-        parser.parse_args(argv, arguments)
+        _, unknown = parser.parse_known_args(argv, arguments)
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}{_hint(unknown[0], argv, arguments)}")
         progress.show()
         arguments.run(arguments)
         sys.stdout.flush()
@@ -66,6 +69,16 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
         if before is not None:
             signal.signal(signal.SIGTERM, before)
     return 0
+
+
+def _hint(unknown: str, argv: Sequence[str] | None, arguments: argparse.Namespace) -> str:
+    """For an option like --k1 100: how to set a parameter."""
+    given = list(sys.argv[1:] if argv is None else argv)
+    name, _, value = unknown.partition("=")
+    value = value or "".join(given[given.index(unknown) + 1 :][:1])
+    if not hasattr(arguments, "parameters") or not re.fullmatch(r"--\w+", name) or not re.fullmatch(r"[\d.]\S*", value):
+        return ""
+    return f"; a parameter is set by --set {name.removeprefix('--')}={value}"
 
 
 def _end_on_sigterm() -> Any:

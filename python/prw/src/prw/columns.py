@@ -103,12 +103,15 @@ class Columns(NamedTuple):
         (name, index) of each column, the time first.
     units
         Unit by name.
+    assumed
+        The columns whose unit is neither in the header nor given.
     notes
         Notes for the user, for example on ignored columns.
     """
 
     taken: list[tuple[str, int]]
     units: dict[str, str]
+    assumed: set[str]
     notes: list[str]
 
 
@@ -118,18 +121,19 @@ def columns(
     line: int,
     outputs: Sequence[str] = (),
     units: Mapping[str, str] | None = None,
-    degrees: bool = False,
+    degrees: bool | None = None,
 ) -> Columns:
     """Find time, both angles, both rates if present, and those `outputs` (names of measured outputs) that are present.
 
     A column's unit is in its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and
-    degrees per second if `degrees`. Raises UserError that names file, row and column. line: row of the header, or 0 for
+    degrees per second if `degrees`. If `degrees` is None, SI is only assumed. Raises UserError that names file, row and column. line: row of the header, or 0 for
     a table in memory.
     """
     where = f"{path}, row {line}" if line else str(path)
     wanted = ("time", *MOTORS, *outputs)
     found: dict[str, int] = {}
     chosen: dict[str, str] = {}
+    assumed = set()
     ignored = []
     for index, title in enumerate(header):
         name, unit = column(title)
@@ -140,9 +144,19 @@ def columns(
             raise UserError(f"{where}, column {name}: appears twice in the header")
         found[name] = index
         try:
-            chosen[name] = _unit(name, unit, (units or {}).get(name, ""), degrees)
+            given = (units or {}).get(name, "")
+            chosen[name] = _unit(name, unit, given, bool(degrees))
+            if degrees is None and not unit and not given:
+                assumed.add(name)
         except UserError as error:
             raise UserError(f"{where}, column {name}: {error}") from None
+    if not found:
+        is_number = [re.fullmatch(r"\s*[-+]?[\d.]+(?:e[-+]?\d+)?\s*", title, re.IGNORECASE) for title in header]
+        what = "there is no header" if all(is_number) else "this is not a table of motor angles"
+        hint = "; separate columns by comma, semicolon or tab" if len(header) == 1 and "theta1" in header[0] else ""
+        raise UserError(
+            f"{where}: {what}; it must have the columns time, theta1, theta2, but the row has {shown(header)}{hint}"
+        )
     for name in ("time", *ANGLES):
         if name not in found:
             hint = "; separate columns by comma, semicolon or tab" if line and len(header) == 1 else ""
@@ -151,7 +165,7 @@ def columns(
         missing = RATES[1] if RATES[0] in found else RATES[0]
         raise UserError(f"{where}: column {missing} is missing; give both {' and '.join(RATES)}, or neither")
     notes = [f"columns ignored: {', '.join(ignored)}"] if ignored else []
-    return Columns([(name, found[name]) for name in wanted if name in found], chosen, notes)
+    return Columns([(name, found[name]) for name in wanted if name in found], chosen, assumed, notes)
 
 
 def shown(header: Sequence[str]) -> str:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import sys
 import unicodedata
+from pathlib import Path
 from typing import Any
 
 #: Number of characters after which a message is cut.
 LONGEST = 1000
+#: The packages that `make study` installs in a clone.
+STUDY = {"matplotlib", "scipy", "threadpoolctl", "jinja2", "pyarrow", "distributed"}
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:
@@ -78,4 +82,6 @@ def need(*packages: str) -> None:
     """Raise MissingPackage unless the packages are installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise MissingPackage(f"{', '.join(missing)} missing; install with: pip install {' '.join(missing)}")
+        in_clone = (Path(sys.prefix).parent / "python/prw/pyproject.toml").is_file()
+        command = "make study" if in_clone and {*missing} <= STUDY else f"pip install {' '.join(missing)}"
+        raise MissingPackage(f"{', '.join(missing)} missing; install with: {command}")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from prw.columns import ANGLES, RATES
+from prw.columns import ANGLES, RATES, Columns
 from prw.errors import UserError
 from prw.motion import Array
 
@@ -56,8 +55,9 @@ def _moves(theta: Array, k: int) -> bool:
     return bool(np.ptp(near, axis=0).max() > max(SMALL_MOVE / 10, 0.002 * float(np.ptp(theta, axis=0).max())))
 
 
-def notes_on_values(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
-    """Returns notes on values that are possible but are probably mistakes. units: the unit of each column in the file."""
+def notes_on_values(path: Path, time: Array, theta: Array, omega: Array | None, columns: Columns) -> list[str]:
+    """Returns notes on values that are possible but are probably mistakes. Raises UserError for an implausible motion of which
+    nobody has said that it is in radians."""
     notes = []
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
         notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
@@ -65,7 +65,6 @@ def notes_on_values(time: Array, theta: Array, omega: Array | None, units: Mappi
         # A percentile, because a single step of a coarse encoder is not a speed.
         speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
         reach = np.abs(theta[:, side]).max()
-        hint = f"if it is in degrees, call it {name} [deg]" if units[name] == "rad" else "are these the right units?"
         steps = np.abs(np.diff(theta[:, side]))
         if len(steps) and (jump := steps.max()) > JUMP:
             notes.append(
@@ -73,9 +72,18 @@ def notes_on_values(time: Array, theta: Array, omega: Array | None, units: Mappi
                 "not restart (numpy.unwrap removes such jumps)"
             )
         if speed > PLAUSIBLE_SPEED:
-            notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
+            implausible = f"turns at {speed:.4g} rad/s ({speed * 30 / np.pi:.4g} rpm)"
         elif reach > PLAUSIBLE_ANGLE:
-            notes.append(f"{name} reaches {reach:.0f} rad ({reach / (2 * np.pi):.1f} turns); {hint}")
+            implausible = f"reaches {reach:.4g} rad ({reach / (2 * np.pi):.3g} turns)"
+        else:
+            continue
+        # A jump by a turn is another mistake.
+        if name in columns.assumed and not (len(steps) and abs(steps.max() - 2 * np.pi) < 0.5):
+            raise UserError(
+                f"{path}: {name} {implausible} if it is in radians, but its header names no unit; add --degrees or --radians "
+                f"(in Python degrees=True or False), or call it {name} [deg] or {name} [rad]"
+            )
+        notes.append(f"{name} {implausible}; are these the right units?")
     if omega is None:
         notes.append(
             "no omega1, omega2: the rates come from the angles, so if the angles are quantised or noisy, the torques "

@@ -82,7 +82,7 @@ class Recording:
 def read(
     path: str | os.PathLike[str] | Table,
     units: Mapping[str, str] | None = None,
-    degrees: bool = False,
+    degrees: bool | None = None,
     *,
     names: Mapping[str, str] = {},
     skip: int = 0,
@@ -106,7 +106,8 @@ def read(
         Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. If an encoder has 10000
         counts per revolution, the unit of its counts is `rev/10000`.
     degrees
-        Columns without a unit are in degrees and degrees per second.
+        Whether columns without a unit are in degrees and degrees per second, or in rad and rad/s. By default they are in rad
+        and rad/s, but a recording whose motors would then move implausibly fast or far is rejected.
     names
         Names of columns in the file, if they differ: {"theta1": "Motor 1"}.
     skip
@@ -125,7 +126,7 @@ def read(
 def read_motion(
     path: str | os.PathLike[str] | Table,
     units: Mapping[str, str] | None = None,
-    degrees: bool = False,
+    degrees: bool | None = None,
     *,
     names: Mapping[str, str] = {},
     skip: int = 0,
@@ -138,7 +139,7 @@ def read_motion(
 def _read(
     source: str | os.PathLike[str] | Table,
     units: Mapping[str, str] | None,
-    degrees: bool,
+    degrees: bool | None,
     measured: tuple[str, ...],
     names: Mapping[str, str],
     skip: int,
@@ -153,7 +154,7 @@ def _read(
     if skip < 0:
         raise UserError("it must be 0 or more lines", argument="skip", given=skip)
 
-    found = Columns([], {}, [])
+    found = Columns([], {}, set(), [])
 
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
@@ -179,7 +180,7 @@ def _read(
             table[name], note = unwrapped(name, time, table[name]) if QUANTITIES[name] == "angle" else (table[name], "")
             motion.notes.extend([note] if note else [])
         motion.notes.extend(notes_on_gaps(path, time, motion.theta))
-        motion.notes.extend(notes_on_values(time, motion.theta, omega, found.units))
+        motion.notes.extend(notes_on_values(path, time, motion.theta, omega, found))
     return Recording(path, motion, table, found.units)
 
 

@@ -49,6 +49,11 @@ def read_table(
         with open(path, encoding=chosen, newline="") as file:
             return _parse(path, file, choose, may_be_empty, increasing, skip)
     except UnicodeError:
+        if not encoding and _is_binary(path):
+            raise UserError(
+                f"{path}: this is not a text file, or it is UTF-16 without its byte order mark; save it as UTF-8 CSV, or read it "
+                "with prw.read(path, encoding=...)"
+            ) from None
         where = path if encoding else _where(path, _undecodable_line(path))
         raise UserError(
             f"{where}: not {encoding or 'UTF-8'} text; save it as UTF-8 CSV, or read it with prw.read(path, encoding=...)"
@@ -173,6 +178,12 @@ def _number(where: str, cell: str, comma: bool, may_be_empty: bool) -> float:
     if not math.isfinite(value):
         raise UserError(f"{where}: {content} is not finite")
     return value
+
+
+def _is_binary(path: Path) -> bool:
+    """Returns whether a file contains a NUL near its beginning, as no text in the usual encodings does."""
+    with open(path, "rb") as file:
+        return b"\0" in file.read(1 << 12)
 
 
 def _undecodable_line(path: Path) -> int:

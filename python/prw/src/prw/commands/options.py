@@ -80,7 +80,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=UNIT,...",
         help="units of columns whose header has none; an encoder's counts are theta1=rev/10000",
     )
-    parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
+    add_unit_options(parser, "columns without a unit are")
     parser.add_argument(
         "--names",
         action=Named,
@@ -99,6 +99,19 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         "--encoding",
         default="",
         help="of the file (default: UTF-8, or UTF-16 if the file begins with its byte order mark)",
+    )
+
+
+def add_unit_options(parser: argparse.ArgumentParser, subject: str) -> None:
+    """Add --degrees and --radians, which exclude each other. subject: the beginning of their help."""
+    both = parser.add_mutually_exclusive_group()
+    both.add_argument("--degrees", action="store_const", const=True, help=f"{subject} in deg and deg/s")
+    both.add_argument(
+        "--radians",
+        action="store_const",
+        const=False,
+        dest="degrees",
+        help=f"{subject} in rad and rad/s (default, but it is needed if the motors are then implausibly fast)",
     )
 
 

@@ -4,6 +4,9 @@ all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure."""
 from __future__ import annotations
 
 import argparse
+import shlex
+import shutil
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +32,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HELP = "simulate the paper's experiment or a recording"
+EXAMPLES = """\
+examples:
+  prw simulate                                        the paper's experiment (Fig. 4) -> out/fig4.csv, out/fig4.png
+  prw simulate --set k1=100 --out soft                the same with softer couplings, N.m/rad
+  prw simulate motors.csv --degrees                   recorded motor angles in degrees
+  prw simulate motors.csv --names 'theta1=Motor 1' --names 'theta2=Motor 2' --animate motors.html
+"""
+#: A recording of a clone, which a hint names if the current directory is the clone.
+RECORDING = Path("examples/point_to_point.csv")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -65,9 +77,9 @@ def run(arguments: argparse.Namespace) -> None:
         motion = call(read_motion, arguments, path=arguments.input)
         title = f"Response to {arguments.input.name}"
     else:
-        if arguments.degrees:
-            raise UserError("--degrees belongs to a recording; the paper's experiment is in radians")
-        motion, title = fig4(), "Fig. 4: equal and opposite motor velocities"
+        if arguments.degrees is not None:
+            raise UserError("--degrees and --radians belong to a recording; the paper's experiment is in radians")
+        motion, title = fig4(), "Fig. 4: opposite motor velocities"
     table, figure_path = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
     if recorded and table.exists() and table.samefile(arguments.input):
         raise UserError(
@@ -112,6 +124,9 @@ def _summary(
     if given:
         lines.append(f"with        {', '.join(f'{name} {value:.5g}' for name, value in given.items())} (SI)")
 
+    # A note may say that the figures below are wrong.
+    lines += [f"note        {note}" for note in response.notes]
+
     def peak(*names: str) -> float:
         return max(float(np.abs(response[name]).max()) for name in names)
 
@@ -123,18 +138,24 @@ def _summary(
         lines.append("            motors at opposite rates turn the wrist about its roll axis only, as in the paper")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
-    lines += [f"note        {note}" for note in response.notes]
     lines.append(f"wrote       {', '.join(map(str, written))}")
     if missing:
         lines.append(f"no figure   {missing}")
     look = f"look at {written[min(1, len(written) - 1)]}"
     if arguments.input is None:
-        lines.append(f"next        {look}; then your own motors: prw simulate motors.csv (see prw simulate --help)")
+        recording = RECORDING if RECORDING.is_file() else "motors.csv"
+        lines += [f"next        {look}, then simulate a recording:", f"            {_program()} simulate {recording}"]
     else:
         lines.append(
-            f"next        {look}; {existing_fmu(arguments.fmu)} also loads in Simulink, OpenModelica and others"
+            f"next        {look}; {existing_fmu(arguments.fmu)} also runs in FMPy, OpenModelica and other tools"
         )
     return lines
+
+
+def _program() -> str:
+    """The program as a user has to type it: its path, unless the shell finds it by its name."""
+    started = sys.argv[0]
+    return shlex.quote(started) if Path(started).stem == "prw" and shutil.which("prw") != started else "prw"
 
 
 def _tidy(value: float) -> str:

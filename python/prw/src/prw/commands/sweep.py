@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT, Named, add_paths, call, listed, spread
+from prw.commands.options import DEFAULT_OUT, Named, add_paths, add_unit_options, call, listed, spread
 from prw.draws import SAMPLINGS
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
@@ -106,7 +106,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="motor recording, as for `prw simulate` (default: the motion of Fig. 4)",
     )
-    parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
+    add_unit_options(parser, "the recording is")
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
     parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")

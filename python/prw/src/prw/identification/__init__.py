@@ -53,7 +53,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     units: Mapping[str, str] = {},
-    degrees: bool = False,
+    degrees: bool | None = None,
     quantum: float = 0.0,
     offsets: bool = True,
     starts: int = 6,
