@@ -6,14 +6,14 @@ it, run it with thousands of parameter sets, animate it, and compare results of 
     run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
-These functions are public; the modules of this package are internal::
+These functions are public; the modules of this package are internal:
 
-    simulate, read, animate, sweep     runs and recordings
-    identify, excite                   parameters from measurements, and motions to measure with
-    linearize, Linearizer              linear models
-    sensitivities                      derivatives of a simulation with respect to parameters
-    check                              another tool's results against a reference
-    default_fmu                        the path of the FMU
+* ``simulate``, ``read``, ``animate``, ``sweep``: runs and recordings
+* ``identify``, ``excite``: parameters from measurements, and motions to measure with
+* ``linearize``, ``Linearizer``: linear models
+* ``sensitivities``: derivatives of a simulation with respect to parameters
+* ``check``: another tool's results against a reference
+* ``default_fmu``: the path of the FMU
 
 Everything is in SI (s, rad, rad/s, N.m, kg.m2), except that a linear model has the units of its FMU. Functions write files
 only to paths that they are given, and print only the progress of long work at a Python prompt or in a notebook. An error
