@@ -145,7 +145,7 @@ def test_the_browser_is_bit_identical_to_the_library(fmu: Path, report: Any) -> 
             rows = np.array(lines, dtype=np.float64)
             assert header[:5] == ["time", *INPUTS] and len(rows) > 400, name
             if "pitch_ref" in header:
-                header, rows = header[:-2], without_controller(rows, header, name)
+                header, rows = header[:-4], without_controller(rows, header, name)
             types = {one: loaded.variables[one].type for one in run["parameters"]}
             start = {k: v if types[k] in ("Real", "Float64") else int(v) for k, v in run["parameters"].items()}
             start = {k: bool(v) if types[k] == "Boolean" else v for k, v in start.items()}
@@ -158,17 +158,21 @@ def test_the_browser_is_bit_identical_to_the_library(fmu: Path, report: Any) -> 
 
 
 def without_controller(rows: np.ndarray, header: list[str], name: str) -> np.ndarray:
-    """Returns the rows without the setpoints. Checks that the controller FMU returns the motor motion in the rows."""
-    off = {"Kp": 0.0, "Ki": 0.0, "Kd": 0.0} if name == "open-loop" else {}
+    """Returns the rows without the setpoints and the slip of motor 2. Checks that the controller FMU returns the motor motion in the
+    rows, to which the slip is added."""
+    gains = {"Kp": 0.0, "Ki": 0.0, "Kd": 0.0} if name == "open-loop" else {"Ki": 20.0}
+    slip = rows[:, [header.index("slip"), header.index("slip_rate")]]
     read = [index for index, one in enumerate(header) if one in CONTROLLED]
     with Fmu(built("prw_controller.fmu")) as loaded:
-        controller = loaded.instances(start=off)
+        controller = loaded.instances(start=gains)
         for number, row in enumerate(rows):
-            np.testing.assert_array_equal(controller.get(INPUTS)[0], row[1:5], f"the controller, {name}, {row[0]} s")
+            motors = controller.get(INPUTS)[0]
+            motors[[1, 3]] += slip[number]
+            np.testing.assert_array_equal(motors, row[1:5], f"the controller, {name}, {row[0]} s")
             controller.set([header[index] for index in read], row[read])
             if number + 1 < len(rows):
                 controller.step(to=rows[number + 1, 0])
-    return rows[:, :-2]
+    return rows[:, :-4]
 
 
 def test_the_page_sends_no_requests_and_fits(fmu: Path, report: Any) -> None:

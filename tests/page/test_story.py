@@ -25,7 +25,7 @@ def text(page: Page, part: str = "what") -> str:
     """Returns the paragraph that explains the step ("what") or gives the reason ("why"), after the run is calculated."""
     for _ in range(5):
         drawn(page)
-    return str(page.locator(f".live-{part} p.live-chosen").inner_text()).replace("\u00a0", " ").replace("\u2212", "-")
+    return str(page.locator(f".live-{part} .live-chosen").inner_text()).replace("\u00a0", " ").replace("\u2212", "-")
 
 
 def set_number(page: Page, name: str, value: float) -> None:
@@ -105,7 +105,7 @@ def test_mean_and_difference(visit: Any, fmu: Path) -> None:
         found, rows = replayed(fmu, saved(page), M=lobes)
         together = rows["time"] < 2.5
         assert np.abs(found["roll"][together]).max() < 1e-9 and np.abs(found["pitch"][~together]).max() < 1e-2
-        roll = float(re.findall(r"by ([\d.]+)°\.$", text(page))[0])
+        roll = float(re.findall(r"only rolls, by ([\d.]+)°", text(page))[0])
         assert roll == pytest.approx(angle * 7 / lobes, abs=0.06)
         # The motion is slow, so the wrist turns like a rigid one.
         assert np.rad2deg(np.abs(found["roll"]).max()) == pytest.approx(roll, rel=0.05)
@@ -128,11 +128,11 @@ def test_resonance(visit: Any, fmu: Path) -> None:
         assert ("with the FMU’s own values 2.04 times as far, at 5.35 Hz" in text(page)) == (softness != 0.76)
         assert ("the peak is lower" in text(page, "why")) == (softness < 0.76)
         assert ("the peak is higher" in text(page, "why")) == (softness > 0.76)
-    for frequency in (5.0, 6.85):
+    for frequency in (5.0, 6.9):
         set_number(page, "Frequency", frequency)
         says = float(re.findall(r"The wrist swings ([\d.]+) times", text(page))[0])
         assert says == pytest.approx(gain(fmu, frequency, k2=np.rad2deg(1.5)), abs=0.006)
-        assert ("This is the peak" in text(page)) == (frequency == 6.85)
+        assert ("This is the peak" in text(page)) == (frequency == 6.9)
     # Without a peak, the page states that there is none.
     field(page, "k2").fill("0.05")
     field(page, "k2").press("Enter")
@@ -168,39 +168,19 @@ def test_the_comparison_stays_while_a_number_is_dragged(visit: Any) -> None:
     the run before the change."""
     page = visit("#try&motion=shaped", reduced_motion="reduce")
     page.wait_for_timeout(300)
-    labels = (
-        "(() => { const all = []; const fill = CanvasRenderingContext2D.prototype.fillText;"
-        "CanvasRenderingContext2D.prototype.fillText = function (text, ...more) { all.push(text); fill.call(this, text, ...more); };"
-        "window.labels = all; })()"
-    )
-    page.evaluate(labels)
+    other = page.locator(".live-player > .live-plots > figure .live-key:last-child:visible")
     for value in ("0.5", "1.5"):
-        page.evaluate("window.labels.length = 0")
         field(page, "k2").fill(value)
         field(page, "k2").press("Enter")
-        until(page, "window.labels.includes('in one go')")
         page.wait_for_timeout(1100)
-    assert not page.evaluate("window.labels.includes('before the change')")
+        expect(other).to_have_text("in one go")
     page = visit("#try&motion=step", reduced_motion="reduce")
     page.wait_for_timeout(300)
-    page.evaluate(labels)
     field(page, "k2").fill("0.3")
     field(page, "k2").press("Enter")
-    until(page, "window.labels.includes('before the change')")
-
-
-def test_the_controller(visit: Any) -> None:
-    page = visit(reduced_motion="reduce")
-    step(page, 5)
-    for pitch, roll in [(25, 50), (-10, 50), (-10, -7)]:
-        set_number(page, "Pitch wanted", pitch)
-        set_number(page, "Roll wanted", roll)
-        rows = np.genfromtxt(io.StringIO(saved(page)), delimiter=",", names=True, skip_header=2)
-        late = np.searchsorted(rows["time"], 1.65 - 1e-9)
-        numbers = [float(one) for one in re.findall(r"(-?[\d.]+)°", text(page))]
-        angles = [np.rad2deg(rows[name][late]) for name in ("theta1", "theta2", "pitch", "roll")]
-        assert numbers[2:] == pytest.approx(angles, abs=0.11)
-        assert numbers[4:] == pytest.approx([pitch, roll], abs=0.2)
+    expect(page.locator(".live-player > .live-plots > figure .live-key:last-child:visible")).to_have_text(
+        "before the change"
+    )
 
 
 def test_steps_loop_until_something_is_touched(visit: Any) -> None:

@@ -4,12 +4,12 @@
  * A number in a paragraph: a parameter of the FMU in the unit of the page, or a number that motions read.
  * @typedef {{name: string, label: string, low: number, high: number, step: number, unit: string}} Dial
  * The values from which a sentence is written. `value` returns a parameter or a number that motions read, `preset` its value when the page opens.
- * `table` has all results of the chosen motion; in a run by hand, `table` and `motion` are `null`.
- * @typedef {{value(name: string): number, preset(name: string): number, table: Table | null, motion: Motion | null, response: ResponsePlot | null}} Facts
- * A part of a paragraph: plain text, a number to drag, or text that depends on values.
- * @typedef {string | Dial | ((facts: Facts) => string)} Part
- * A step: its title, the explanation, the reason, and the settings of its run as in a link.
- * @typedef {{title: string, parts: Part[], why: Part[], settings: Record<string, string> & {motion: string}}} Chapter
+ * `table` has all results of the chosen motion, and `other` those of the run for comparison; in a run by hand, `table` and `motion` are `null`.
+ * @typedef {{value(name: string): number, preset(name: string): number, table: Table | null, other: Table | null, motion: Motion | null, response: ResponsePlot | null}} Facts
+ * A part of a paragraph: plain text, a number to drag, text that depends on values, or such text in a line of its own.
+ * @typedef {string | Dial | ((facts: Facts) => string) | {line(facts: Facts): string}} Part
+ * A step: its title, the explanation, a question and its answer, and the settings of its run as in a link.
+ * @typedef {{title: string, parts: Part[], question: string, why: Part[], settings: Record<string, string> & {motion: string}}} Chapter
  */
 
 class Guide {
@@ -30,10 +30,19 @@ class Guide {
       button.addEventListener("click", () => choose(chapter));
       return button;
     });
-    const steps = [{ parts: lead, why: /** @type {Part[]} */ ([]) }, ...chapters];
-    this.texts = steps.map(({ parts, why }, index) => [parts, why].map((one) => element("p", {}, ...one.map((part) => this.part(part, index)))));
+    const paragraph = (/** @type {Part[]} */ parts, /** @type {number} */ step) => element("p", {}, ...parts.map((part) => this.part(part, step)));
+    const isWide = matchMedia("(min-width: 52rem)");
+    /** For each step the explanation and, except for the lead, the answer, which is closed in narrow windows. @type {HTMLElement[][]} */
+    this.texts = [[paragraph(lead, 0)]];
+    chapters.forEach(({ parts, question, why }, index) => {
+      const answer = element("details", {}, element("summary", {}, question), paragraph(why, index + 1));
+      const unfold = () => (answer.open = isWide.matches);
+      unfold();
+      isWide.addEventListener("change", unfold);
+      this.texts.push([paragraph(parts, index + 1), answer]);
+    });
     const buttons = element("div", { class: "live-buttons live-steps", role: "group", "aria-label": "Steps" }, ...this.buttons);
-    const blocks = [0, 1].map((block) => element("div", { class: `live-texts ${block ? "live-why" : "live-what"}` }, ...this.texts.map((both) => both[block])));
+    const blocks = [0, 1].map((block) => element("div", { class: `live-texts ${block ? "live-why" : "live-what"}` }, ...this.texts.flatMap((both) => both.slice(block, block + 1))));
     this.elements = [...(chapters.length ? [buttons] : []), blocks[0], ...(chapters.length ? [blocks[1]] : [])];
   }
 
@@ -64,11 +73,12 @@ class Guide {
     if (typeof part === "string") {
       return part;
     }
-    if (typeof part !== "function") {
+    if ("low" in part) {
       return this.dial(part);
     }
-    const target = element("span");
-    (this.written[step] ||= []).push({ target, write: part });
+    const isInline = typeof part === "function";
+    const target = element("span", isInline ? {} : { class: "live-line" });
+    (this.written[step] ||= []).push({ target, write: isInline ? part : part.line });
     return target;
   }
 
@@ -79,7 +89,7 @@ class Guide {
     const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
     const show = (/** @type {number} */ given) => {
       value = given;
-      made.textContent = `${given.toFixed(digits)}${unit === "\u00b0" ? "" : "\u00a0"}${unit}`;
+      made.textContent = `${given.toFixed(digits).replace("-", "\u2212")}${unit === "\u00b0" ? "" : "\u00a0"}${unit}`;
       made.setAttribute("aria-valuenow", given.toFixed(digits));
       made.setAttribute("aria-valuetext", made.textContent);
     };

@@ -2,7 +2,7 @@
 
 /**
  * What a model adds to the page. `label` is the label of the list of motions. The table contains the outputs, the variables `recorded` and the columns `written`
- * by motions. `follow` moves inputs towards the sliders; `move` of a view moves sliders by increments. Motions read `numbers`, and paragraphs of the guide change
+ * by motions. `follow` moves inputs towards the sliders; `move` of a view moves sliders by increments, those of one argument together. Motions read `numbers`, and paragraphs of the guide change
  * them within `limits`. The parameters `near`, each with a short description, are next to the sliders. `response` is drawn above the plots. If `isAtRest`, a run by
  * hand starts at rest with any inputs, so a new run can continue after its last row.
  * @typedef {{
@@ -10,7 +10,7 @@
  *   lead: Part[], guide: Chapter[], numbers: Record<string, number>, limits?: Dial[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
  *   isAtRest?: boolean, companion?: Companion,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
- *   view(move: (increments: Record<string, number>) => void, value: (name: string) => number, pace: (speed: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
+ *   view(move: (...increments: Record<string, number>[]) => void, value: (name: string) => number, pace: (speed: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, Setting>},
  *   response?(change: (name: string, value: number) => void): ResponsePlot,
  * }} AddOn
  * A setting of the view in a link: its value, its value when the page opens, and a function that sets it and returns whether the value is possible.
@@ -67,7 +67,7 @@ class Trial {
       this.recalculate();
     });
     this.guide = new Guide(this.addOn.lead, this.addOn.guide, (chapter) => this.follow(chapter), (name, value) => this.change(name, value));
-    this.view = this.addOn.view((increments) => this.drag(increments), (name) => this.value(name), (speed) => this.player.setSpeed(speed));
+    this.view = this.addOn.view((...increments) => this.drag(...increments), (name) => this.value(name), (speed) => this.player.setSpeed(speed));
     this.response = this.addOn.response?.((name, value) => this.change(name, value));
     this.player = this.createPlayer();
   }
@@ -163,6 +163,7 @@ class Trial {
         return one ? (addOn.start[name] ?? startOf(one)) * one.factor + one.offset : this.numbers[name];
       },
       table: session.motion ? session.table : null,
+      other: this.other?.table ?? null,
       motion: session.motion,
       response: this.response ?? null,
     });
@@ -233,18 +234,22 @@ class Trial {
     player.setPlaying(true);
   }
 
-  /** Moves sliders from the view, as far as they reach. @param {Record<string, number>} increments */
-  drag(increments) {
+  /** Moves sliders from the view. The sliders of one argument move together, until one of them is at its end. @param {...Record<string, number>} increments */
+  drag(...increments) {
     const { session } = this;
     this.isTouched = true;
     /** @type {Record<string, number>} */
     const values = {};
-    for (const [name, by] of Object.entries(increments)) {
-      const current = session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0);
-      const reach = this.addOn.sliders.find((one) => one.name === name)?.reach ?? 1;
-      values[name] = Math.max(-reach, Math.min(reach, current + by));
-      this.sliders.show.get(name)?.(values[name]);
+    const current = (/** @type {string} */ name) => values[name] ?? (session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0));
+    for (const together of increments) {
+      const shares = Object.entries(together).map(([name, by]) => {
+        const reach = this.addOn.sliders.find((one) => one.name === name)?.reach ?? 1;
+        return by ? Math.max(0, reach - Math.sign(by) * current(name)) / Math.abs(by) : 1;
+      });
+      const share = Math.min(1, ...shares);
+      Object.entries(together).forEach(([name, by]) => (values[name] = current(name) + share * by));
     }
+    Object.entries(values).forEach(([name, value]) => this.sliders.show.get(name)?.(value));
     this.byHand(values);
   }
 
@@ -291,6 +296,17 @@ class Trial {
     }
     this.write();
     player.setPlaying(motion !== undefined && allowsMotion());
+    this.rest();
+  }
+
+  /** Shows the finished run if the user's system does not allow animations. */
+  rest() {
+    const { session, player } = this;
+    if (session.motion && !player.isPlaying && !allowsMotion()) {
+      session.finish(this.end, this.move);
+      player.now = this.end;
+      player.requestFrame();
+    }
   }
 
   /** Chooses a motion with the current parameters. The browser's Back returns to the motion before. @param {string} id */
@@ -441,6 +457,7 @@ class Trial {
       const { isPlaying } = player;
       player.setSpeed(this.pace);
       player.setPlaying(isPlaying || (isByHand && settings.size > 1));
+      this.rest();
     }
     this.isTouched = false;
     this.status.classList.toggle("live-error", problems.length > 0);
@@ -478,7 +495,7 @@ class Trial {
       const { label = name, low = -Infinity, high = Infinity, unit = "" } = addOn.limits?.find((dial) => dial.name === name) ?? {};
       const number = value === "" ? NaN : Number(value);
       if (!(number >= low && number <= high)) {
-        return `${label} must be from ${quantity(low, "")} to ${quantity(high, unit)}, but it is ${value}`;
+        return `${label} must be from ${quantity(low, "")} to ${quantity(high, unit)}, but it is ${value.replace("-", "\u2212")}`;
       }
       addOn.numbers[name] = number;
       return "";

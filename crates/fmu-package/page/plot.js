@@ -6,7 +6,7 @@
  * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isInteger?: boolean, isStepwise?: boolean, isGoal?: boolean}} Curve
  * A panel. `isNoted` panels show the notes of a motion.
  * @typedef {{title: string, unit: string, curves: Curve[], isNoted?: boolean}} Panel
- * A run for comparison, which is drawn in grey, and its label at the curve.
+ * A run for comparison, which is drawn in grey, and its label.
  * @typedef {{table: Table, label: string}} Comparison
  * A remark at a time (or at another abscissa) of the plot.
  * @typedef {[number, string]} Note
@@ -172,7 +172,9 @@ class Plots {
       return { value, key };
     });
     const unit = panel.unit ? ` (${panel.unit})` : "";
-    const caption = element("figcaption", {}, element("b", {}, panel.title + unit), " ", ...keys.map(({ key }) => key));
+    const other = element("span", { class: "live-key", hidden: "" });
+    other.style.setProperty("--colour", "var(--soft)");
+    const caption = element("figcaption", {}, element("b", {}, panel.title + unit), " ", ...keys.map(({ key }) => key), other);
     const names = panel.curves.map((curve) => curve.label).join(", ");
     const canvas = element("canvas", { role: "img", "aria-label": `${panel.title}${unit}: ${names} over ${this.axis}` });
     canvas.addEventListener("pointerdown", (event) => {
@@ -184,7 +186,7 @@ class Plots {
         seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
       }
     });
-    return { panel, canvas, keys, figure: element("figure", {}, caption, canvas), peak: 0 };
+    return { panel, canvas, keys, other, figure: element("figure", {}, caption, canvas) };
   }
 
   /** @param {number} x @param {number} width */
@@ -211,7 +213,15 @@ class Plots {
     });
     // The width changes in steps, so that the axes do not move with each digit.
     this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ textWidth }) => textWidth))) / 8));
+    let isNamed = false;
     for (const [index, panel] of this.panels.entries()) {
+      // The first panel in which the runs clearly differ names the other run.
+      const { low, high } = axes[index];
+      /** @type {boolean} */
+      const isApart = !isNamed && other !== null && table.count > 0 && gap(panel.panel, table, other.table, begin, end) > 0.03 * (high - low);
+      isNamed ||= isApart;
+      panel.other.hidden = !isApart;
+      panel.other.textContent = other?.label ?? "";
       this.drawPanel(panel, axes[index], table, now, index === this.panels.length - 1, other, panel.panel.isNoted ? notes : []);
     }
   }
@@ -228,17 +238,17 @@ class Plots {
     const x = (/** @type {number} */ time) => area.left + ((time - begin) / (end - begin)) * (area.right - area.left);
     const y = (/** @type {number} */ value) => area.bottom - ((value - low) / (high - low)) * (area.bottom - area.top);
     this.drawGrid(pen, area, marks.map(({ value, text }) => ({ text, at: y(value) })), ticks(begin, end, Math.min(8, width / 60)).map(({ value, text }) => ({ text, at: x(value) })), isLast);
-    const say = (/** @type {string} */ text, /** @type {number} */ left, /** @type {number} */ top, /** @type {string} */ name) => {
+    const say = (/** @type {string} */ text, /** @type {number} */ left) => {
       const half = pen.measureText(text).width / 2 + 2;
       const middle = Math.max(area.left + half, Math.min(area.right - half, left));
       pen.textAlign = "center";
       pen.textBaseline = "alphabetic";
       pen.lineWidth = 3;
       pen.strokeStyle = colour("paper-here");
-      pen.strokeText(text, middle, top);
+      pen.strokeText(text, middle, 13);
       pen.lineWidth = 1;
-      pen.fillStyle = colour(name);
-      pen.fillText(text, middle, top);
+      pen.fillStyle = colour("ink");
+      pen.fillText(text, middle, 13);
     };
     if (table.count) {
       pen.strokeStyle = colour("soft");
@@ -280,12 +290,7 @@ class Plots {
         }
       }
     }
-    const apart = other && table.count ? farthest(panel, table, other.table, begin, end) : null;
-    if (other && apart && Math.abs(apart.value - apart.own) > 0.03 * (high - low)) {
-      // Puts the label on the side of the grey curve that is away from the run's own curve.
-      say(other.label, x(apart.time), Math.max(area.top + 10, Math.min(area.bottom - 4, y(apart.value) + (apart.value > apart.own ? -5 : 14))), "soft");
-    }
-    notes.forEach(([time, text]) => say(text, x(time), 13, "ink"));
+    notes.forEach(([time, text]) => say(text, x(time)));
   }
 
   /**
@@ -320,22 +325,14 @@ function isDashed(panel, index) {
   return panel.curves.slice(0, index).filter(({ isGoal }) => !isGoal).length % 2 === 1 && !panel.curves[index].isGoal;
 }
 
-/**
- * Returns the point at which the curves of another run are farthest from this run: the time, the other run's value, and this run's value; `null` if
- * they are equal or cannot be compared.
- * @param {Panel} panel @param {Table} table @param {Table} other @param {number} begin @param {number} end
- */
-function farthest(panel, table, other, begin, end) {
-  /** @type {{time: number, value: number, own: number} | null} */
-  let found = null;
-  for (const { name, factor, offset = 0 } of panel.curves.filter(({ isGoal }) => !isGoal)) {
+/** The largest distance between the curves of two runs. @param {Panel} panel @param {Table} table @param {Table} other @param {number} begin @param {number} end */
+function gap(panel, table, other, begin, end) {
+  let found = 0;
+  for (const { name, factor } of panel.curves.filter(({ isGoal }) => !isGoal)) {
     const [times, column] = [other.column("time"), other.column(name)];
     const [first, last] = rowsOf(other, begin, Math.min(end, table.end));
     for (let row = first; row <= last; row += Math.max(1, (last - first) >> 9)) {
-      const [value, own] = [factor * column[row] + offset, factor * table.at(name, times[row]) + offset];
-      if (Math.abs(value - own) > (found ? Math.abs(found.value - found.own) : 0)) {
-        found = { time: times[row], value, own };
-      }
+      found = Math.max(found, Math.abs(factor * (column[row] - table.at(name, times[row]))));
     }
   }
   return found;

@@ -18,9 +18,10 @@ pub(crate) const PAGE: &str = "documentation/index.html";
 /// The page for a model that does not have one.
 const PLAIN: &str = include_str!("../page/page.html");
 /// Placeholder for the section that runs the FMU, which the scripts insert. It is as high as the window, so that the rest of the page
-/// does not move when the section appears. If scripts are disabled, it is only a note.
+/// does not move when the section appears. Until then it says what is to come; if scripts are disabled, it is only a note.
 const SPACE: &str = concat!(
-    "<div id=\"live\" style=\"min-height:100vh\"><noscript><style>#live{min-height:0!important}</style>",
+    "<div id=\"live\" style=\"min-height:100vh\"><p>The FMU starts here in a moment.</p>",
+    "<noscript><style>#live{min-height:0!important}#live>p:first-child{display:none}</style>",
     "<p class=\"note\">If you enable scripts, this page runs the FMU here. The rest of the page is complete.</p></noscript></div>",
 );
 const BEGIN: &str = include_str!("../page/begin.js");

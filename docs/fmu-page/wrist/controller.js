@@ -60,6 +60,6 @@ addOns.prw_controller = (own, others) => {
     panels: WRIST_PANELS.map((panel) => (panel.title === "Wrist" ? { ...panel, curves: [...panel.curves, ...wanted] } : panel)),
     isMinor: () => false,
     follow: (inputs, targets) => targets.forEach((value, name) => void (inputs[name] = value)),
-    view: (turn, _, pace) => wristView(({ pitch = 0, roll = 0 }) => turn({ pitch_ref: pitch, roll_ref: roll }), ["gripper"], pace),
+    view: (turn, _, pace) => wristView(({ pitch = 0, roll = 0 }) => turn({ pitch_ref: pitch }, { roll_ref: roll }), ["gripper"], pace),
   };
 };

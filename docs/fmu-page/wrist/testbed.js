@@ -2,14 +2,20 @@
 
 /** Pole of pitch with the parameters of Table 1, 1/s, for the input shaper. */
 const PITCH_POLE = { real: -9.683, imaginary: 34.678 };
-/** Numbers that the guide changes: angles of the motors (deg), frequency of the vibration (Hz), and goals of the controller (deg). */
-const NUMBERS = { alone: 20, angle: 40, frequency: 1, pitch_goal: 25, roll_goal: 50 };
+/** Numbers that the guide changes: angles of the motors (deg), frequency of the vibration (Hz), goals of the controller and slip of motor 2 (deg). */
+const NUMBERS = { alone: 20, angle: 40, frequency: 1, pitch_goal: 25, roll_goal: 50, slip: 8 };
 /** Angle of the fast move, deg, its duration, and the times at which it begins: in one go, and in two parts, s. */
 const FAST = { angle: 20, duration: 0.1, begin: 0.1, again: 1.9 };
 /** Time between the two parts of the shaped move: half a swing, s. Share of the second part. */
 const [HALF_SWING, SECOND_SHARE] = shaper();
 /** Lowest and highest frequency of the response, and the distance of its points, Hz. */
 const BAND = [0.5, 15, 0.05];
+/** Largest angle of a motor that is moved by hand, rad. */
+const REACH = Math.PI / 2;
+/** Time at which motor 1, alone, is fastest; time at which motor 2 slips; and time at which the errors of the loop are stated, s. */
+const [FASTEST, SLIPS, LATE] = [0.5, 1.5, 3.3];
+/** Integral gain of the controller in the loop, 1/s. With its own gain, 3, a visitor would wait long for the end of a correction. */
+const GAIN = 20;
 /** Double pole with which the motors follow the sliders, 1/s. */
 const FOLLOW = 25;
 
@@ -101,8 +107,8 @@ const MOTIONS = [
   { ...motorMotion("shaped", "A move of 20\u00b0 in two parts (an input shaper for the default k\u2081 and k\u2082)", 1, (time) => both(move(time - FAST.begin, true))), other: { id: "move", label: "in one go" } },
 ];
 
-/** Inputs and outputs of the controller. */
-const [SET_POINTS, MEASURED, MOTORS] = [["pitch_ref", "roll_ref"], ["pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"], ["theta1", "theta2", "omega1", "omega2"]];
+/** Inputs of the controller, columns with the slip of motor 2, and more inputs and the outputs of the controller. */
+const [SET_POINTS, SLIPPED, MEASURED, MOTORS] = [["pitch_ref", "roll_ref"], ["slip", "slip_rate"], ["pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"], ["theta1", "theta2", "omega1", "omega2"]];
 
 /** Frequency response of pitch to equal motor angles, measured with a pulse on a second instance of the FMU. */
 class Resonance {
@@ -197,27 +203,29 @@ class Resonance {
 
 /**
  * A motion in which the controller FMU drives the testbed FMU: at each communication point, they exchange their outputs. The set
- * points pitch the wrist, roll it, and return.
- * @param {Fmu} fmu the controller @param {string} id @param {string} title @param {string[]} off gains that are 0 @param {Motion["other"]} [other]
+ * points pitch the wrist and roll it. Then motor 2 slips on its shaft, which the controller does not know.
+ * @param {Fmu} fmu the controller @param {string} id @param {string} title @param {Record<string, number>} gains @param {Motion["other"]} [other]
  * @returns {Motion}
  */
-function closedLoop(fmu, id, title, off, other) {
+function closedLoop(fmu, id, title, gains, other) {
   const [controllerInputs, motors] = [new Float64Array(8), new Float64Array(4)];
   const find = (/** @type {string} */ name) => /** @type {Variable} */ (fmu.description.byName.get(name));
   const [inputGroup, outputGroup] = [[...SET_POINTS, ...MEASURED], MOTORS].map((names) => fmu.group(names.map(find)));
   return {
-    id, title, length: 2.6, other,
-    begin: () => fmu.begin(new Map(off.map((gain) => [find(gain), 0]))),
+    id, title, length: 3.4, other,
+    begin: () => fmu.begin(new Map(Object.entries(gains).map(([gain, value]) => [find(gain), value]))),
     inputs: (time, inputs, table) => {
       const row = table.count;
-      SET_POINTS.forEach((name, axis) => (table.column(name)[row] = DEGREE * (time >= [0.1, 0.9][axis] && time < 1.7 ? [NUMBERS.pitch_goal, NUMBERS.roll_goal][axis] : 0)));
+      SET_POINTS.forEach((name, axis) => (table.column(name)[row] = DEGREE * (time >= [0.1, 0.9][axis] ? [NUMBERS.pitch_goal, NUMBERS.roll_goal][axis] : 0)));
       if (row > 0) {
         [...SET_POINTS, ...MEASURED].forEach((name, index) => (controllerInputs[index] = table.column(name)[row - 1]));
         fmu.set(inputGroup, controllerInputs);
         fmu.stepTo(time);
       }
       fmu.get(outputGroup, motors);
-      MOTORS.forEach((name, index) => (inputs[name] = motors[index]));
+      const slips = quintic(time - SLIPS, 0.1).map((part) => part * NUMBERS.slip * DEGREE);
+      SLIPPED.forEach((name, index) => (table.column(name)[row] = slips[index]));
+      MOTORS.forEach((name, index) => (inputs[name] = motors[index] + (index % 2 ? slips[index >> 1] : 0)));
     },
   };
 }
@@ -234,17 +242,17 @@ addOns.prw_testbed = (own, others) => {
     label: "Motion",
     start: { use_omega: 1 },
     sliders: [
-      { name: "theta1", label: "Motor 1", reach: Math.PI / 2 },
-      { name: "theta2", label: "Motor 2", reach: Math.PI / 2 },
+      { name: "theta1", label: "Motor 1", reach: REACH },
+      { name: "theta2", label: "Motor 2", reach: REACH },
     ],
     recorded: ["theta5", "theta6"],
-    written: SET_POINTS,
+    written: [...SET_POINTS, ...SLIPPED],
     isAtRest: true,
     motions: [
       ...MOTIONS,
       ...others.map((one) => new Fmu(one)).flatMap((controller) => [
-        closedLoop(controller, "closed-loop", "The controller FMU closes the loop", [], { id: "open-loop", label: "without feedback" }),
-        closedLoop(controller, "open-loop", "The controller FMU with gains 0: without feedback", ["Kp", "Ki", "Kd"]),
+        closedLoop(controller, "closed-loop", "The controller FMU closes the loop", { Ki: GAIN }, { id: "open-loop", label: "without feedback" }),
+        closedLoop(controller, "open-loop", "The controller FMU with gains 0: without feedback", { Kp: 0, Ki: 0, Kd: 0 }),
       ]),
     ],
     panels: WRIST_PANELS.map((panel) => (panel.title === "Wrist" ? { ...panel, curves: [...panel.curves, ...goals] } : panel)),
@@ -263,8 +271,7 @@ addOns.prw_testbed = (own, others) => {
       wristView(({ theta1 = 0, theta2 = 0, pitch = 0, roll = 0 }) => {
         // The inverse of eq. (1): the motor angles of a pitch and a roll angle.
         const half = (value("M") / value("N")) * roll;
-        const all = { theta1: theta1 + pitch + half, theta2: theta2 + pitch - half };
-        turn(pitch || roll ? all : theta1 ? { theta1 } : { theta2 });
+        turn(...(theta1 ? [{ theta1 }] : theta2 ? [{ theta2 }] : [{ theta1: pitch, theta2: pitch }, { theta1: half, theta2: -half }]));
       }, ["motors", "gripper"], pace),
   };
 };

@@ -5,7 +5,8 @@
  * @param {Move} move @param {("motors" | "gripper")[]} handles parts that can be dragged @param {(speed: number) => void} pace sets the speed of the run
  */
 function wristView(move, handles, pace) {
-  const wrist = new Wrist(WRIST, move, handles);
+  // From the front and from above, so that pitch moves the gripper down and up, as the pointer that drags it.
+  const wrist = new Wrist({ ...WRIST, azimuth: -82, elevation: 24 }, move, handles);
   const inside = element("button", { type: "button", "aria-pressed": "false" }, "Look inside");
   const lookInside = (/** @type {boolean} */ isInside) => {
     inside.setAttribute("aria-pressed", String(isInside));

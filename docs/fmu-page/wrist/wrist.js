@@ -348,7 +348,7 @@ class Wrist {
       this.isHinting &&= !dragged;
       if (dragged === "gripper") {
         const { scale } = this.camera();
-        move?.({ pitch: (signs[0] * down) / (1.2 * scale), roll: (signs[1] * right) / (0.5 * scale) });
+        move?.({ pitch: (signs[0] * down) / this.climb(), roll: (signs[1] * right) / (0.5 * scale) });
       } else if (dragged) {
         const box = canvas.getBoundingClientRect();
         move?.({ [dragged.motor]: this.angleOf(dragged.side, [event.clientX - box.left, event.clientY - box.top], [right, down]) });
@@ -373,6 +373,14 @@ class Wrist {
     const down = rotation[4] * axisZ - rotation[5] * axisY;
     const axis = transformed(rotation, transformed(this.turns.output, [0, 1, 0]));
     return [down < 0 ? -1 : 1, axis[1] < 0 ? -1 : 1];
+  }
+
+  /** How far the gripper moves down or up on the canvas for each radian of pitch, px. Where that is hardly far, the pointer is faster. */
+  climb() {
+    const tip = transformed(this.turns.output, [0, 2, 0]);
+    const [c, s] = [Math.cos(0.01), Math.sin(0.01)];
+    const pitched = [tip[0], c * tip[1] - s * tip[2], s * tip[1] + c * tip[2]];
+    return Math.max(0.9 * this.camera().scale, Math.abs(this.project(pitched)[1] - this.project(tip)[1]) / 0.01);
   }
 
   /**
@@ -594,7 +602,7 @@ class Wrist {
         label("motor 2", this.project([4.1, 0.95, 0]), "text-2", "center");
       }
       if (isOn("ring")) {
-        label("ring: pitch", this.project(transformed(this.turns.pitch, [1.05, -1.25, 0])), "text-3", "left");
+        label("ring: pitch", this.project(transformed(this.turns.pitch, [1.2, -1.35, 0])), "text-3", "left");
       }
       if (isOn("gripper")) {
         label("gripper: roll", this.project(transformed(this.turns.output, [0, 2, 0])).map((value, axis) => value + (axis ? 0 : 0.75 * this.camera().scale)), "text-4", "left");
@@ -607,7 +615,8 @@ class Wrist {
     if (this.caption) {
       label(this.caption, [8, height - 12], "ink", "left");
     }
-    if (this.isHinting && !this.isInside && this.handles.length) {
+    // In a narrow image, the caption takes the space of the hint.
+    if (this.isHinting && !this.isInside && this.handles.length && !(this.caption && width < 480)) {
       label(this.handles.length > 1 ? "Drag the gripper or a motor" : `Drag the ${this.handles[0]}`, [this.caption ? width - 10 : width / 2, height - 12], "ink", this.caption ? "right" : "center");
     }
   }
