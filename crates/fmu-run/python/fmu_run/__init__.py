@@ -9,7 +9,8 @@
     model.step(1e-3)
     model.get("y")  # (instances,)
 
-    loop = fmu_run.System({"law": law, "plant": fmu}, {"law.u": "plant.u", "plant.y": "law.y"})
+    links = {"law.u": "plant.u", "plant.y": "law.y"}
+    loop = fmu_run.System({"law": law, "plant": fmu}, links)
     loop.run(time, start={"law.gain": gains}, outputs=["plant.y"])
 
 Values are in the FMU's units, which `Fmu.variables` contains. FMI 2.0 and FMI 3.0 are supported.

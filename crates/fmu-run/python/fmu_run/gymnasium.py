@@ -1,7 +1,9 @@
 """Gymnasium environments for any FMU: one instance (`Env`), or thousands in parallel (`VectorEnv`), both with the same `Task`::
 
-    task = Task(fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
-                reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0)
+    task = Task(
+        fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
+        reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0,
+    )
     envs = VectorEnv(task, 1024)
 
 Needs the package gymnasium: pip install gymnasium.

@@ -3,7 +3,7 @@ it, run it with thousands of parameter sets, animate it, and compare results of 
 
     import prw
 
-    run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
+    run = prw.simulate("motors.csv", {"k1": 100.0})  # by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
 These functions are public; the modules of this package are internal:
