@@ -21,6 +21,7 @@ EXAMPLES = (
     "tolerances",
     "gains",
     "learned_move",
+    "learned_limits",
     "predictive_control",
     "torque_driven",
 )

@@ -189,6 +189,13 @@ def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> Non
     assert len(figure.axes) == 2
 
 
+def test_a_little_learning_beats_every_lqr() -> None:
+    limits = importlib.import_module("learned_limits")
+    figure, away = limits.main(count=512, rounds=12, fresh=200)
+    assert away["learned"].mean() < 0.97 * away["best LQR"].mean()
+    assert len(figure.axes) == 3
+
+
 def test_planned_motion_reaches_the_goal_and_stays(capsys: pytest.CaptureFixture[str]) -> None:
     planner = importlib.import_module("predictive_control")
     figure, errors = planner.main(rollouts=256, length=1.0)

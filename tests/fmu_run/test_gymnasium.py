@@ -360,7 +360,8 @@ def test_the_program_in_the_document(fmu, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.chdir(ROOT)
     page = (ROOT / "docs/learning.md").read_text(encoding="utf-8")
     names: dict = {}
-    exec(re.findall(r"^```python\n(.*?)^```", page, flags=re.M | re.S)[0], names)
+    first, second, *_ = re.findall(r"^```python\n(.*?)^```", page, flags=re.M | re.S)
+    exec(first, names)
     task, envs = names["task"], names["envs"]
     assert names["rewards"].shape == (1024,) and not names["terminated"].any()
     assert np.allclose(names["rewards"], -1.0), "the wrist must be at rest, 20 degrees from the goal"
@@ -372,3 +373,7 @@ def test_the_program_in_the_document(fmu, monkeypatch: pytest.MonkeyPatch) -> No
         assert truncated.all() == (step == task.length)
     assert np.allclose(observations[:, 0], names["RATE"] * names["STEP"] * (task.length - 1), rtol=1e-6)
     assert task.failed_reward < cost.min()
+    exec(second, names)
+    envs, rewards = names["harder_envs"], names["harder_envs"].step(np.zeros((8, 1)))[1]
+    assert names["observations"].shape == (8, 5) and envs.values.shape == (8, 7)
+    assert np.allclose(rewards, -envs.values[:, 4]), "the wrist must be at rest"
