@@ -217,7 +217,9 @@ def realistic(fmu: str, simulated: rig.Rig, seed: int, kind: str, size: float) -
     doubted = any("suggest" in note for note in found.notes)
     missed = float((np.maximum(low - true, true - high) / (high - low)).max())
     # A cause counts as named if it is among the first two.
-    named = any(row.named in each for each in [*found.additions, *found.diagnosis[:2], *found.notes])
+    named = bool(row.named) and any(
+        row.named in each for each in [*found.additions, *found.diagnosis[:2], *found.notes]
+    )
     return Outcome(found.fits, doubted, named, ((low < true) & (true < high)).tolist(), missed, words)
 
 

@@ -49,11 +49,18 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
                 assert not is_built, f"{line}: does not use the FMU with the identified parameters"
                 start = [sys.executable] if command[0] == "python" else [sys.executable, "-m", "prw"]
                 reported += run([*start, *command[1:]], tmp_path, environment)
-    rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", reported))
-    found = json.loads((tmp_path / "out" / "identified" / "report.json").read_text())["parameters"]
-    for name in ("k1", "k2", "c1", "c2", "c3"):
-        off = np.log(found[name]["value"] / float(rig[name]))
-        assert abs(off) < 0.01, f"{name} {off:+.2%}"
+    rigs = re.findall(r"true parameters of the rig: (.*)", reported)
+    for truth, directory in zip(rigs, ("identified", "friction"), strict=True):
+        rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", truth))
+        found = json.loads((tmp_path / "out" / directory / "report.json").read_text())["parameters"]
+        for name in ("k1", "k2", "c1", "c2", "c3"):
+            off = np.log(found[name]["value"] / float(rig[name]))
+            assert abs(off) < 0.01, f"{name} {off:+.2%}"
+    # The page shows two lines of the result, and the rig's k1.
+    page = TUTORIAL.read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```text\n(.*?)^```$", page, re.S | re.M)
+    assert all(line in reported for line in shown.splitlines()), shown
+    assert f"prints {rig['k1']} N.m/rad" in page
     for name in ("report.html", "report.json", "identified.json", "identified.ssv"):
         assert (tmp_path / "out" / "identified" / name).is_file()
     assert (tmp_path / "out" / "sweep" / "runs.parquet").is_file()

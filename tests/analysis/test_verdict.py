@@ -118,7 +118,7 @@ def test_what_the_rig_adds_is_estimated(real_rigs, fmu, name):
     (addition,) = found.additions
     assert addition.startswith(f"{added} of ") and addition in found.summary() and not found.diagnosis
     value, error = found.distortions[added]
-    assert value == pytest.approx(size, rel=0.1) and error < 0.1 * size
+    assert abs(value - size) < 4.5 * error < 0.5 * size
 
 
 def test_friction_is_estimated_on_request(real_rigs, fmu):
@@ -159,7 +159,7 @@ def test_drifting_sensors_and_wrapped_angles_are_explained(experiment, fmu):
     found = prw.identify(drifting, starts=1, fmu=fmu)
     assert_contains(found, experiment)
     assert found.additions == ["slow drift of theta3, tau2"] or found.additions == ["slow drift of tau2, theta3"]
-    angles = {name: (columns[name] + 3) % turn - np.pi for name in ("theta1", "theta2", "theta3", "theta4")}
+    angles = {name: columns[name] % turn for name in ("theta1", "theta2", "theta3", "theta4")}
     found = prw.identify({**columns, **angles}, starts=1, fmu=fmu)
     assert_contains(found, experiment)
     assert sum("restarts after full turns" in note for note in found.notes) == 4

@@ -84,17 +84,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             help=f"channels that may {effect}, separated by commas; the {kind} is estimated, too",
         )
     for kind, what in (
-        ("friction", "dry friction, N.m"),
-        ("backlash", "springs k with backlash, rad, or the motors"),
-        ("cubic", "springs with the torque k (twist + cubic twist^3), 1/rad2"),
-        ("crosstalk", "torque channels to which the other torque adds a share"),
+        ("friction", "places with dry friction (N.m)"),
+        ("backlash", "springs with backlash (rad), or the motors"),
+        ("cubic", "springs with the torque k (twist + cubic twist^3), cubic in 1/rad2"),
+        ("crosstalk", "torques to which the other one adds a share"),
     ):
         parser.add_argument(
             f"--{kind}",
             type=listed,
             default="",
             metavar="PLACES",
-            help=f"{what}, which is estimated, too: {', '.join(KINDS[kind].places)}",
+            help=f"{what}; the size is estimated, too: {', '.join(KINDS[kind].places)}",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"

@@ -40,6 +40,8 @@ TRIED = 2
 WORTH_TRYING = 0.03
 #: Gain in likelihood for each unknown below which a hypothesis counts as chance.
 COST = 12.0
+#: A fit with a hypothesis that does not explain the data is refined at most this number of times.
+REFINED = 4
 #: Hypotheses that explain the data with a gain in likelihood that differs by less than this are not distinguished.
 ALIKE_GAIN = 25.0
 #: Maximum number of hypotheses that are combined. A further one must gain more than this share of the first one's gain.
@@ -124,10 +126,14 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
         if not trials or trials[0].gain < max(CLEAR**2, SECOND * first):
             break
         best = trials[0]
-        if not best.verdict.fits:
+        for _ in range(REFINED):
             # Far from the solution, the patterns of large effects need more rounds.
-            refined = refitted(best.solution, tolerances=FINE)
+            if best.verdict.fits:
+                break
+            before, refined = best.solution.deviance, refitted(best.solution, tolerances=FINE)
             best = best._replace(solution=refined, verdict=judge(refined))
+            if before - refined.deviance < COST:
+                break
         chosen.append(best)
         rivals = [t for t in trials[1:] if t.verdict.fits and t.gain > best.gain - ALIKE_GAIN]
         # A delay of more channels is not another cause.

@@ -21,6 +21,8 @@ from prw.testbed import OUTPUTS
 
 #: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
 TURNING = 0.02
+#: Time in s after which the states have forgotten how they began.
+SETTLED = 1.0
 #: Rounds in which the frictions of two shafts are adjusted to each other within a step.
 ADJUSTED = 3
 
@@ -162,27 +164,38 @@ def _moved(
     (n, m). A: times the step. states: (n, 6) without effects."""
     if not sizes:
         return states, {}
-    steps, moved, shift = {}, states.copy(), np.zeros(6)
+    steps, moved = {}, states.copy()
     for d, size in sizes.items():
         stepped, gain = _held(A, laws[d].drive * experiment.step)
         towards, of = laws[d].follows[0], laws[d].of
         signals = states @ towards.T + experiment.theta @ laws[d].follows[1].T
         steps[d] = size, size * gain, size * (towards @ gain), towards, of, signals
     found = {d: np.zeros_like(signals) for d, (*_, signals) in steps.items()}
-    before = {d: signals[0] for d, (*_, signals) in steps.items()}
-    for k in range(len(states) - 1):
-        ahead = stepped @ shift
-        for d, (size, gain, own, towards, of, signals) in steps.items():
-            expected = signals[k + 1] + towards @ ahead
-            if of is None:
-                found[d][k] = _braked(before[d], expected, own)
-            else:
-                found[d][k] = (of(before[d], size) + of(expected, size)) / 2
-            ahead = ahead + gain @ found[d][k]
-        for d, (*_, towards, _, signals) in steps.items():
-            before[d] = signals[k + 1] + towards @ ahead
-        shift = ahead
-        moved[k + 1] += shift
+
+    def follow(first: int, shift: Array) -> Array:
+        """Follows the effects from row `first`, where they have shifted the states by `shift`, to the end. Returns the last shift."""
+        before = {d: signals[first] + towards @ shift for d, (*_, towards, _, signals) in steps.items()}
+        moved[first] = states[first] + shift
+        for k in range(first, len(states) - 1):
+            ahead = stepped @ shift
+            for d, (size, gain, own, towards, of, signals) in steps.items():
+                expected = signals[k + 1] + towards @ ahead
+                if of is None:
+                    found[d][k] = _braked(before[d], expected, own)
+                else:
+                    # During the step, the effect is about as large as in the step before.
+                    expected = expected + own @ found[d][k - 1]
+                    found[d][k] = (of(before[d], size) + of(expected, size)) / 2
+                ahead = ahead + gain @ found[d][k]
+            for d, (*_, towards, _, signals) in steps.items():
+                before[d] = signals[k + 1] + towards @ ahead
+            shift = ahead
+            moved[k + 1] = states[k + 1] + shift
+        return shift
+
+    # The spectra count the recording as periodic, so the first row follows the last one.
+    last = follow(max(len(states) - int(SETTLED / experiment.step) - 1, 0), np.zeros(6))
+    follow(0, stepped @ last)
     return moved, found
 
 

@@ -42,7 +42,7 @@ NOISE_ROUNDS = 30
 #: The patterns of effects are repeated until the unknowns change by less than this.
 FOLLOWED = 2e-4
 #: Highest degree of the polynomials that describe the drift of a channel.
-DRIFT = 3
+DRIFT = 5
 #: Least distance of the start of a search from the bounds.
 INSIDE = 1e-6
 #: Tolerances of a search.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import medfilt
 
 from prw.columns import si_unit
 from prw.identification.experiment import Experiment
@@ -10,8 +11,8 @@ from prw.motion import Array
 
 #: Frequencies of the mains, Hz, the range around them whose power is compared, and the ratio of the power that counts as hum.
 MAINS, AROUND, HUM = (50.0, 60.0), (0.7, 8.0), 30.0
-#: A spike differs from the median by this number of standard deviations.
-SPIKE = 9.0
+#: A spike differs from the median of NEIGHBOURS rows by this number of standard deviations.
+SPIKE, NEIGHBOURS = 9.0, 7
 #: Standard errors by which the squares of the residuals must follow the squares of the rates, if the sampling times jitter.
 JITTER = 6.0
 
@@ -25,13 +26,14 @@ def notes_on_residuals(experiment: Experiment, modelled: Array) -> list[str]:
     for name, column, power in zip(experiment.channels, residual.T, experiment.channel_power.T):
         keep = np.isfinite(column)
         time, values = experiment.sampled[keep], column[keep]
-        values = values - np.median(values)
-        spread = max(1.4826 * float(np.median(np.abs(values))), float(np.sqrt(power.mean())))
-        spikes = np.abs(values) > SPIKE * spread
+        # Neighbours show what else the residual contains.
+        sudden = values - medfilt(values, NEIGHBOURS)
+        spread = max(float(np.median(np.abs(values))) * 1.4826, float(np.sqrt(power.mean())))
+        spikes = np.abs(sudden) > SPIKE * spread
         if spikes.any():
-            worst = int(np.abs(values).argmax())
+            worst = int(np.abs(sudden).argmax())
             notes.append(
-                f"{name} has spikes in {spikes.sum()} rows, the largest of {abs(values[worst]):.2g} {si_unit(name)} at {time[worst]:.6g} s; "
+                f"{name} has spikes in {spikes.sum()} rows, the largest of {abs(sudden[worst]):.2g} {si_unit(name)} at {time[worst]:.6g} s; "
                 "empty these cells, which are then skipped"
             )
             values = np.where(spikes, 0.0, values)
