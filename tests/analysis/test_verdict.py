@@ -52,7 +52,7 @@ REAL_RIGS = {
     "friction of a shaft": ({"friction": (0.0, 0.01)}, "friction in input shaft 2", 0.01),
     "friction of the output": ({"output_friction": 0.02}, "friction about pitch and roll", 0.02),
     "backlash": ({"play": (0.002, 0.0)}, "backlash in the couplings k1", 0.002),
-    "more backlash": ({"play": (0.0, 0.008)}, "backlash in the couplings k2", 0.008),
+    "backlash of k2": ({"play": (0.0, 0.004)}, "backlash in the couplings k2", 0.004),
     "cubic stiffness": ({"cubic": (0.0, 20.0)}, "cubic stiffness of the couplings k2", 20.0),
     "undetectable friction": ({"friction": (0.001, 0.001)}, "", 0.0),
     "hardly any friction": ({"friction": (0.0005, 0.0005)}, "", 0.0),
@@ -150,6 +150,34 @@ def test_a_change_over_time_is_named(real_rigs, fmu, tmp_path):
     assert after / before == pytest.approx(0.95, abs=0.004)
     found.report(tmp_path / "report.html")
     assert "Parameters over time" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+#: Disturbances of a column that leave the estimates correct, and a part of the note.
+DISTURBED = {
+    "hum": (lambda c: {"tau1": c["tau1"] + 0.02 * np.sin(2 * np.pi * 50 * c["time"])}, "tau1 contains hum of 50 Hz"),
+    "spikes": (
+        lambda c: {"roll": c["roll"] + 0.1 * (np.arange(len(c["roll"])) % 600 == 300)},
+        "roll has spikes in 10 rows",
+    ),
+}
+
+
+@pytest.mark.parametrize("disturbance", DISTURBED)
+def test_a_disturbance_is_noted(experiment, fmu, disturbance):
+    change, note = DISTURBED[disturbance]
+    columns = recording(experiment)
+    found = prw.identify({**columns, **change(columns)}, starts=1, fmu=fmu)
+    assert_contains(found, experiment)
+    assert any(note in each for each in found.notes), found.notes
+
+
+def test_a_channel_that_is_not_explained_is_a_misfit(experiment, fmu):
+    """Its residual is above the compared frequencies, so no other test detects it."""
+    columns = recording(experiment)
+    pitch = columns["pitch"] + np.sin(2 * np.pi * 200 * columns["time"])
+    found = prw.identify({**columns, "pitch": pitch}, starts=1, fmu=fmu)
+    assert [misfit.channel for misfit in found.verdict.misfits] == ["pitch"], found.misfits
+    assert "as large as the motion" in found.misfits[0] and "none of these explains the data" in found.summary()
 
 
 def test_drifting_sensors_and_wrapped_angles_are_explained(experiment, fmu):
