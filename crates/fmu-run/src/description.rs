@@ -1,8 +1,8 @@
 //! The model description with array elements as variables, for running and connecting FMUs.
 
 use crate::arrays::{Array, Arrays};
+use crate::change::Change;
 use crate::index::Index;
-use crate::system::Change;
 use crate::unit::Unit;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Standard, Value};

@@ -9,6 +9,8 @@
 
 mod arrays;
 mod batch;
+mod change;
+mod connector;
 mod continuous;
 mod description;
 mod error;

@@ -1,8 +1,8 @@
 //! Variables found by name, and checks whether a caller may set them.
 
+use crate::connector::{Connector, End};
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
-use crate::system::{Connector, End};
 use fmi_abi::BaseType;
 
 /// A variable of a component that was found by its name.

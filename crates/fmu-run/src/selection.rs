@@ -1,9 +1,10 @@
 //! Groups of variables that are set or read together.
 
+use crate::change::Change;
+use crate::connector::End;
 use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
-use crate::system::{Change, End};
 use fmi_abi::{BaseType, Standard};
 use fmi_client::Rejection;
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! Units as defined in model descriptions (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
 
-use crate::system::Change;
+use crate::change::Change;
 use std::fmt;
 
 /// Names of the base units.

@@ -1,6 +1,5 @@
 //! Systems of connected FMUs.
 
-mod change;
 mod configured;
 mod elements;
 mod order;
@@ -12,6 +11,8 @@ mod ssp;
 #[cfg(feature = "write")]
 mod structure;
 
+use crate::change::Change;
+use crate::connector::Connector;
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
@@ -19,7 +20,6 @@ use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
 use crate::pool::Pool;
 use crate::selection::Selection;
-pub(crate) use change::Change;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
@@ -71,28 +71,6 @@ pub(crate) struct Component {
     /// Name; empty for a single component.
     pub name: String,
     pub fmu: Arc<Loaded>,
-}
-
-/// An input or output of a system.
-#[derive(Clone, Debug)]
-pub(crate) struct Connector {
-    /// The variable of the first end, in the unit of the connector.
-    pub variable: Variable,
-    /// Whether callers can only read it.
-    pub is_output: bool,
-    /// The variables that it denotes.
-    pub ends: Vec<End>,
-}
-
-/// A connection between an input or output of a system and a variable of a component.
-#[derive(Clone, Debug)]
-pub(crate) struct End {
-    /// Name of the variable.
-    pub variable: String,
-    /// Change from the value of the connector to the value of the variable.
-    pub into: Change,
-    /// The opposite change.
-    pub out: Change,
 }
 
 /// Specification of a system: components and connections.

@@ -1,6 +1,6 @@
 //! Determines the sequence in which values are passed from outputs to inputs at a communication point.
 
-use super::Change;
+use crate::change::Change;
 use crate::description::Dependencies;
 use crate::error::{Error, request};
 use crate::instance::Instance;

@@ -1,5 +1,6 @@
 //! SSP files (System Structure and Parameterization 1.0).
 
+mod open;
 mod parameters;
 mod read;
 mod routes;

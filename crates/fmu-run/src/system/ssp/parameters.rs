@@ -1,26 +1,17 @@
 //! Start values of a system: parameter sets and the mappings of their names and values (sections 5.2.3, 6 and 7 of SSP 1.0).
 
-use super::read::{Read, Transformation, child, children, needed, units};
+use super::read::{Binding, Read, Transformation, child, children, needed, units};
 use super::routes::{Link, NamedUnit, Routes};
 use super::source::Base;
+use crate::change::Change;
 use crate::error::{Error, request};
 use crate::lookup::Found;
-use crate::system::{Change, Definition, StartValue};
-use crate::unit::Unit;
+use crate::system::{Definition, StartValue};
 use fmi_abi::files::read_xml;
 use fmi_abi::{boolean, shown, xml};
 use roxmltree::Node;
 use std::collections::HashMap;
 use std::path::Path;
-
-/// A parameter binding of a system or a component.
-pub(super) struct Binding<'r> {
-    pub node: Node<'r, 'r>,
-    /// Name of the system or component, which ends with a dot or is empty.
-    pub path: String,
-    /// Index of the component, unless it is the binding of a system.
-    pub component: Option<usize>,
-}
 
 /// A value of a parameter set.
 #[derive(Clone)]
@@ -116,10 +107,6 @@ impl<'t> Target<'t> {
 }
 
 impl Read<'_> {
-    pub fn fail(&self, why: &str) -> Error {
-        Error::Fmu(format!("{}: {why}", self.path.display()))
-    }
-
     /// Returns the file to which an element refers, and its name; `None` if the element has the content itself. `directory` is the
     /// component's.
     fn file(&self, node: Node, directory: Option<&Path>) -> Result<Option<(String, String)>, String> {
@@ -252,6 +239,3 @@ impl Value {
         Ok(StartValue::Number(change.apply(number)))
     }
 }
-
-/// Definitions of units by name.
-pub(super) type Units = HashMap<String, Unit>;

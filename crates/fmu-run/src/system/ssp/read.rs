@@ -1,19 +1,14 @@
-//! Reads systems from SSP files (System Structure and Parameterization 1.0).
+//! Reads the structure of a system: components, connectors, connections and parameter bindings.
 
 use super::FMU;
-use super::parameters::{Binding, Target, Units};
 use super::source::Base;
+use crate::change::Change;
 use crate::error::Error;
-use crate::files::{Files, Kind, STRUCTURE};
-use crate::fmu::Loaded;
-use crate::start::StartValues;
-use crate::system::{Change, Component, Definition, Order, System};
 use crate::unit::Unit;
-use fmi_abi::files::Limits;
-use fmi_abi::{boolean, shown, xml};
+use fmi_abi::{boolean, shown};
 use roxmltree::Node;
 use std::cell::Cell;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -27,7 +22,7 @@ pub(super) struct Read<'r> {
     pub path: &'r Path,
     pub base: Base<'r>,
     /// Names of the components and paths of their FMUs, in the order of the file.
-    components: Vec<(String, PathBuf)>,
+    pub components: Vec<(String, PathBuf)>,
     /// Connectors of systems and components by name.
     pub connectors: HashMap<String, Declared>,
     pub connections: Vec<Connection>,
@@ -39,6 +34,18 @@ pub(super) struct Read<'r> {
     /// Number of bytes that may still be read.
     remaining: Cell<usize>,
 }
+
+/// A parameter binding of a system or a component.
+pub(super) struct Binding<'r> {
+    pub node: Node<'r, 'r>,
+    /// Name of the system or component, which ends with a dot or is empty.
+    pub path: String,
+    /// Index of the component, unless it is the binding of a system.
+    pub component: Option<usize>,
+}
+
+/// Definitions of units by name.
+pub(super) type Units = HashMap<String, Unit>;
 
 /// A connector as declared in the file.
 pub(super) struct Declared {
@@ -73,66 +80,8 @@ pub(super) enum Transformation {
     Names(Vec<(String, String)>),
 }
 
-impl System {
-    /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer system is an input or
-    /// output of the system, with the same name, if connections lead to a component. Start values are read from parameter bindings.
-    /// All files to which the system refers must be in the archive. `path` may also be the directory of an unpacked system.
-    ///
-    /// # Safety
-    /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
-    ///
-    /// # Errors
-    /// Returns [`Error::Fmu`] if the file is not an SSP file, if one of its FMUs cannot be loaded, and for unsupported content:
-    /// components that are not FMUs, and signal dictionaries. Returns [`Error::Request`] if a start value does not fit its variable, or
-    /// if a connection names a connector that does not exist or has no direction. Also returns the errors of
-    /// [`connect`](Self::connect).
-    pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
-        let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
-        let mut limits = Limits::default();
-        let directory = Files::open(path, Kind::Ssp, &mut limits).map_err(fail)?;
-        let text = directory.xml(STRUCTURE).map_err(fail)?;
-        let document = xml::parse(&text, STRUCTURE).map_err(fail)?;
-        let root = document.root_element();
-        let system = child(root, "System").ok_or_else(|| fail(format!("{STRUCTURE} has no System")))?;
-        let is_archive = matches!(directory, Files::Temporary(_));
-        let mut read = Read::of(path, Base { directory: directory.path(), is_archive }, root);
-        read.system(system, "").map_err(fail)?;
-
-        let mut loaded: BTreeMap<&Path, Arc<Loaded>> = BTreeMap::new();
-        let mut components = Vec::new();
-        for (name, source) in &read.components {
-            let fmu = match loaded.get(source.as_path()) {
-                Some(fmu) => Arc::clone(fmu),
-                None => {
-                    // SAFETY: the caller guarantees that the libraries are sound.
-                    let opened = unsafe { Loaded::open(source, false, &mut limits) };
-                    let opened = opened.map_err(|error| {
-                        let inside = directory.path().canonicalize().unwrap_or_default();
-                        let inside = format!("{}/", inside.display());
-                        fail(format!("component {}: {}", shown(name), error.to_string().replace(&inside, "")))
-                    })?;
-                    Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
-                }
-            };
-            components.push(Component { name: name.clone(), fmu });
-        }
-        let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), components);
-        let links = read.links(&definition)?;
-        let routes = read.routes(&definition, &links)?;
-        read.connect(&mut definition, &links, &routes);
-        let start = Target::of(&read, &definition, &links, &routes).start_values()?;
-        definition.start = start;
-        let experiment = child(root, "DefaultExperiment");
-        definition.stop_time =
-            experiment.and_then(|of| of.attribute("stopTime")).and_then(|text| text.parse().ok());
-        let system = definition.finish(order)?;
-        StartValues::of(&system, &[])?;
-        Ok(system)
-    }
-}
-
 impl<'r> Read<'r> {
-    fn of(path: &'r Path, base: Base<'r>, root: Node) -> Self {
+    pub fn of(path: &'r Path, base: Base<'r>, root: Node) -> Self {
         let item =
             |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
         let enumerations = children(root, "Enumerations").filter_map(|of| {
@@ -152,6 +101,11 @@ impl<'r> Read<'r> {
         }
     }
 
+    /// Returns an error of the file.
+    pub fn fail(&self, why: &str) -> Error {
+        Error::Fmu(format!("{}: {why}", self.path.display()))
+    }
+
     /// Subtracts from the number of bytes that may still be read. Fails if too few remain.
     pub fn take(&self, bytes: usize) -> Result<(), String> {
         let remaining = self.remaining.get().checked_sub(bytes);
@@ -167,7 +121,7 @@ impl<'r> Read<'r> {
 
     /// Reads a system. The names of its elements begin with `path`. The recursion is limited, because the XML parser limits the depth
     /// of the file.
-    fn system(&mut self, node: Node<'r, 'r>, path: &str) -> Result<(), String> {
+    pub fn system(&mut self, node: Node<'r, 'r>, path: &str) -> Result<(), String> {
         self.connectors(node, path, true)?;
         for element in children(node, "Elements") {
             let name = self.name(path, needed(element, "name")?)?;

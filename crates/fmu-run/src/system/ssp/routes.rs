@@ -2,8 +2,10 @@
 //! transformations on the way (sections 4.5.2 and 5.3.2 of SSP 1.0).
 
 use super::read::{Endpoint, Read, Transformation};
+use crate::change::Change;
+use crate::connector::{Connector, End};
 use crate::error::{Error, request};
-use crate::system::{Change, Connector, Definition, End};
+use crate::system::Definition;
 use crate::unit::Unit;
 use fmi_abi::shown;
 use std::collections::HashMap;

@@ -1,0 +1,73 @@
+//! Opens systems in SSP files (System Structure and Parameterization 1.0).
+
+use super::parameters::Target;
+use super::read::{Read, child};
+use super::source::Base;
+use crate::error::Error;
+use crate::files::{Files, Kind, STRUCTURE};
+use crate::fmu::Loaded;
+use crate::start::StartValues;
+use crate::system::{Component, Definition, Order, System};
+use fmi_abi::files::Limits;
+use fmi_abi::{shown, xml};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+impl System {
+    /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer system is an input or
+    /// output of the system, with the same name, if connections lead to a component. Start values are read from parameter bindings.
+    /// All files to which the system refers must be in the archive. `path` may also be the directory of an unpacked system.
+    ///
+    /// # Safety
+    /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
+    ///
+    /// # Errors
+    /// Returns [`Error::Fmu`] if the file is not an SSP file, if one of its FMUs cannot be loaded, and for unsupported content:
+    /// components that are not FMUs, and signal dictionaries. Returns [`Error::Request`] if a start value does not fit its variable, or
+    /// if a connection names a connector that does not exist or has no direction. Also returns the errors of
+    /// [`connect`](Self::connect).
+    pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
+        let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
+        let mut limits = Limits::default();
+        let directory = Files::open(path, Kind::Ssp, &mut limits).map_err(fail)?;
+        let text = directory.xml(STRUCTURE).map_err(fail)?;
+        let document = xml::parse(&text, STRUCTURE).map_err(fail)?;
+        let root = document.root_element();
+        let system = child(root, "System").ok_or_else(|| fail(format!("{STRUCTURE} has no System")))?;
+        let is_archive = matches!(directory, Files::Temporary(_));
+        let mut read = Read::of(path, Base { directory: directory.path(), is_archive }, root);
+        read.system(system, "").map_err(fail)?;
+
+        let mut loaded: BTreeMap<&Path, Arc<Loaded>> = BTreeMap::new();
+        let mut components = Vec::new();
+        for (name, source) in &read.components {
+            let fmu = match loaded.get(source.as_path()) {
+                Some(fmu) => Arc::clone(fmu),
+                None => {
+                    // SAFETY: the caller guarantees that the libraries are sound.
+                    let opened = unsafe { Loaded::open(source, false, &mut limits) };
+                    let opened = opened.map_err(|error| {
+                        let inside = directory.path().canonicalize().unwrap_or_default();
+                        let inside = format!("{}/", inside.display());
+                        fail(format!("component {}: {}", shown(name), error.to_string().replace(&inside, "")))
+                    })?;
+                    Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
+                }
+            };
+            components.push(Component { name: name.clone(), fmu });
+        }
+        let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), components);
+        let links = read.links(&definition)?;
+        let routes = read.routes(&definition, &links)?;
+        read.connect(&mut definition, &links, &routes);
+        let start = Target::of(&read, &definition, &links, &routes).start_values()?;
+        definition.start = start;
+        let experiment = child(root, "DefaultExperiment");
+        definition.stop_time =
+            experiment.and_then(|of| of.attribute("stopTime")).and_then(|text| text.parse().ok());
+        let system = definition.finish(order)?;
+        StartValues::of(&system, &[])?;
+        Ok(system)
+    }
+}
