@@ -53,9 +53,12 @@ impl Numbers {
 
 /// Fails for a masked array with masked values, because a conversion would return the values under the mask.
 fn check_masks(name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
-    static MASKED: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    static NDARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = values.py();
-    if values.is_instance(MASKED.import(py, "numpy.ma", "MaskedArray")?)?
+    let ndarray = NDARRAY.import(py, "numpy", "ndarray")?;
+    // NumPy imports numpy.ma, which takes long, only when it is needed: for a subclass of its arrays.
+    if !values.get_type().is(ndarray)
+        && values.is_instance(ndarray)?
         && py.import("numpy.ma")?.call_method1("is_masked", (values,))?.is_truthy()?
     {
         return Err(PyValueError::new_err(format!(
