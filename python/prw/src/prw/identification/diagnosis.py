@@ -37,15 +37,15 @@ AT_REST = 1e-3
 #: Number of hypotheses of each kind with which the fit is repeated.
 TRIED = 2
 #: A hypothesis is tried if its expected gain in likelihood exceeds this share of the largest expected gain.
-WORTH_TRYING = 0.03
+WORTH_TRYING = 0.05
 #: Gain in likelihood for each unknown below which a hypothesis counts as chance.
 COST = 12.0
 #: A fit with a hypothesis that does not explain the data is refined at most this number of times.
-REFINED = 4
+REFINED = 2
 #: Hypotheses that explain the data with a gain in likelihood that differs by less than this are not distinguished.
 ALIKE_GAIN = 25.0
 #: Maximum number of hypotheses that are combined. A further one must gain more than this share of the first one's gain.
-MOST, SECOND = 4, 0.01
+MOST, SECOND = 3, 0.01
 #: The hypothesis that the inertias differ from the drawing, and their standard deviation in the fit that frees them.
 INERTIAS, DRAWING = Hypothesis("inertias", ("J2", "J3", "H3")), 0.1
 TORQUES = ("tau1", "tau2")
@@ -146,7 +146,8 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
         if best.hypothesis == INERTIAS or _all_torques(best.hypothesis, solution):
             rivals += [t for t in trials[1:] if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, solution)]
         rivals = list({t.hypothesis: t for t in rivals}.values())
-        if best.verdict.fits:
+        # If the first cause explains no channel, further ones would be guesses.
+        if best.verdict.fits or len(best.verdict.misfits) >= len(verdict.misfits) > 1:
             break
     causes = _described(best, chosen, rivals)
     if not best.verdict.fits or not all(each.hypothesis.belongs for each in [*chosen, *rivals]):

@@ -21,6 +21,8 @@ from prw.testbed import OUTPUTS
 
 #: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
 TURNING = 0.02
+#: Share of a spring's torque up to which the cubic part grows; without this limit, wrong data could make the motion unstable.
+LARGEST = 0.5
 #: Time in s after which the states have forgotten how they began.
 SETTLED = 1.0
 #: Rounds in which the frictions of two shafts are adjusted to each other within a step.
@@ -75,7 +77,9 @@ def _free(twist: Array, size: float) -> Array:
 
 def _cubed(twist: Array, size: float) -> Array:
     """Shift of a spring's end for a torque k (twist + size twist^3)."""
-    return twist**3
+    reach = np.sqrt(LARGEST / abs(size)) if size else np.inf
+    found: Array = np.clip(twist, -reach, reach) ** 3
+    return found
 
 
 def sign(signal: Array) -> Array:
