@@ -77,8 +77,8 @@ def notes_on_values(path: Path, time: Array, theta: Array, omega: Array | None, 
             implausible = f"reaches {reach:.4g} rad ({reach / (2 * np.pi):.3g} turns)"
         else:
             continue
-        # A jump by a turn is another mistake.
-        if name in columns.assumed and not (len(steps) and abs(steps.max() - 2 * np.pi) < 0.5):
+        # A jump alone is another mistake.
+        if name in columns.assumed and (reach > PLAUSIBLE_ANGLE or not (len(steps) and steps.max() > JUMP)):
             raise UserError(
                 f"{path}: {name} {implausible} if it is in radians, but its header names no unit; add --degrees or --radians "
                 f"(in Python degrees=True or False), or call it {name} [deg] or {name} [rad]"
