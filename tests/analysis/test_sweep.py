@@ -88,7 +88,7 @@ def test_wrong_options(prw, tmp_path, arguments, message):
 
 
 def test_a_sweep_in_which_all_runs_fail(fmu):
-    with pytest.warns(RuntimeWarning, match=r"all 2 runs failed; run 0: .*k1 must not be below"):
+    with pytest.warns(RuntimeWarning, match=r"all 2 runs failed; run 0: .*k1 must be above 0"):
         prw.sweep({"k1": [-1.0, -2.0]}, fmu=fmu)
 
 
