@@ -52,6 +52,15 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     reject(format!("there are {needed} {what}, the array has {count} elements"))
 }
 
+/// Reserves memory for `count` more elements. Because the length comes from the importer, missing memory is an error of
+/// the call. Call this only after the references have been checked: a wrong length then costs no memory.
+pub(crate) fn reserve<T>(elements: &mut Vec<T>, count: usize) -> Outcome {
+    match elements.try_reserve(count) {
+        Ok(()) => Ok(()),
+        Err(_) => reject(format!("there is no memory for {count} values")),
+    }
+}
+
 /// Calls `body` with the indices of all elements of variables of FMI 3.0. The value reference of the first element
 /// denotes the whole array, and the values of an array are contiguous (section 2.2.7.2 of FMI 3.0).
 ///
@@ -66,10 +75,12 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
 ) -> Outcome {
     // SAFETY: the caller guarantees the array and its length.
     let vr: &[R] = unsafe { in_slice(R::cast(vr), count, R::REFERENCES) }?;
+    instance.check_references(vr)?;
     same("values", instance.count_elements(vr)?, value_count)?;
     // Moved out so that `body` can borrow the instance; moved back to reuse the allocation.
     let mut elements = std::mem::take(&mut instance.elements);
     elements.clear();
+    reserve(&mut elements, value_count)?;
     elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.index())));
     let outcome = body(instance, &elements);
     instance.elements = elements;

@@ -1,6 +1,6 @@
 //! Partial and time derivatives, which are written to arrays of the importer.
 
-use super::{in_slice, out_slice, same};
+use super::{in_slice, out_slice, reserve, same};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
@@ -19,6 +19,9 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     seed: (*const f64, usize),
     result: (*mut f64, usize),
 ) -> Outcome {
+    if !M::PARTIALS {
+        return instance.reject_derivatives(ADJOINT);
+    }
     let (seed_count, result_count) = (seed.1, result.1);
     // SAFETY: the caller guarantees the arrays and their lengths.
     let (unknown, known, seed, result) = unsafe {
@@ -34,18 +37,25 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     let [wanted, seeded] = if ADJOINT { [counts[1], counts[0]] } else { counts };
     same(seeded.0, seeded.1, seed_count)?;
     same(wanted.0, wanted.1, result_count)?;
+    // Before the first write, because the arrays are shorter if the importer passes a wrong length.
+    instance.check_references(if ADJOINT { known } else { unknown })?;
     result.fill(MaybeUninit::new(0.0));
     // SAFETY: all values have been written.
     let sums = unsafe { &mut *(std::ptr::from_mut(result) as *mut [f64]) };
     if M::ARRAYS && R::ARRAYS {
-        let [unknown, known] = [unknown, known].map(elements::<M, R>);
+        let [unknown, known] =
+            [elements::<M, R>(unknown, counts[0].1)?, elements::<M, R>(known, counts[1].1)?];
         return instance.derivatives::<_, ADJOINT>(&unknown, &known, seed, sums);
     }
     instance.derivatives::<_, ADJOINT>(unknown, known, seed, sums)
 }
 
-fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
-    vr.iter().flat_map(|vr| elements_of::<M>(vr.index())).collect()
+/// Returns the indices of all elements; `count` is their number.
+fn elements<M: Exported, R: Reference>(vr: &[R], count: usize) -> Outcome<Vec<u32>> {
+    let mut elements = Vec::new();
+    reserve(&mut elements, count)?;
+    elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.index())));
+    Ok(elements)
 }
 
 /// Computes time derivatives of outputs (section 4.2.1 of FMI 2.0, 4.1.2 of FMI 3.0). `count` is the number of
@@ -72,10 +82,13 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     same("values", instance.count_elements(vr)?, value_count)?;
     if M::ARRAYS && R::ARRAYS {
         // One order applies to the whole array (section 4.1.2 of FMI 3.0).
-        let of_elements =
-            |(vr, order): (&R, &i32)| elements_of::<M>(vr.index()).map(|_| *order).collect::<Vec<_>>();
-        let order: Vec<i32> = vr.iter().zip(order).flat_map(of_elements).collect();
-        return instance.get_output_derivatives(&elements::<M, R>(vr), &order, value);
+        let elements = elements::<M, R>(vr, value_count)?;
+        let mut orders = Vec::new();
+        reserve(&mut orders, value_count)?;
+        for (vr, order) in vr.iter().zip(order) {
+            orders.extend(elements_of::<M>(vr.index()).map(|_| *order));
+        }
+        return instance.get_output_derivatives(&elements, &orders, value);
     }
     instance.get_output_derivatives(vr, order, value)
 }

@@ -1,7 +1,7 @@
 //! Getters and setters, which exchange values with arrays of the importer (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI
 //! 3.0).
 
-use super::string;
+use super::{reserve, string};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference};
 use fmi_abi::BaseType;
@@ -181,7 +181,9 @@ pub(crate) fn get_strings<M: Exported, R: Reference>(
     values: &mut [MaybeUninit<*const c_char>],
     bases: &[BaseType],
 ) -> Outcome {
-    let mut strings = Vec::with_capacity(vr.len());
+    instance.check_types(vr, bases)?;
+    let mut strings = Vec::new();
+    reserve(&mut strings, vr.len())?;
     instance.get(vr, bases, &mut |_, value| {
         if let Value::String(value) = value {
             // Replaces NULs, because C would read a NUL as the end of the string.
@@ -205,18 +207,18 @@ pub(crate) unsafe fn set_strings<M: Exported, R: Reference>(
     values: &[*const c_char],
     bases: &[BaseType],
 ) -> Outcome {
-    let mut strings = Vec::with_capacity(vr.len());
-    for (index, value) in values.iter().enumerate() {
-        // SAFETY: by contract, each value is NULL or a string.
-        let fault = match unsafe { string(*value) }.map(CStr::to_str) {
-            Some(Ok(value)) => {
-                strings.push(Value::String(value.to_owned()));
-                continue;
-            }
+    instance.check_types(vr, bases)?;
+    // SAFETY: by contract, each value is NULL or a string.
+    let text = |index: usize| unsafe { string(values[index]) }.map(CStr::to_str);
+    for index in 0..values.len() {
+        let fault = match text(index) {
+            Some(Ok(_)) => continue,
             Some(Err(_)) => "not UTF-8",
             None => "NULL",
         };
         return instance.reject_value(vr, bases, index, |name| format!("the string for {name} is {fault}"));
     }
-    instance.set(vr, bases, &|index| strings[index].clone())
+    instance.set(vr, bases, &|index| {
+        Value::String(text(index).and_then(Result::ok).unwrap_or_default().to_owned())
+    })
 }

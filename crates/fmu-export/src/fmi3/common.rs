@@ -7,9 +7,9 @@
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{in_slice, of_elements, out_slice, out_value, partial_derivatives};
+use crate::boundary::{in_slice, of_elements, out_slice, out_value, partial_derivatives, reserve};
 use crate::export::Exported;
-use crate::instance::{FromOne, Instance, Outcome, reject};
+use crate::instance::{FromOne, Instance, Outcome, reject, too_long};
 use fmi_abi::BaseType::{self, *};
 use fmi_abi::{Mode, Status, Value};
 
@@ -76,7 +76,8 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values = out_slice(values, value_count, "values")?;
             let sizes = out_slice(sizes, value_count, "valueSizes")?;
-            let mut found = Vec::with_capacity(vr.len());
+            let mut found = Vec::new();
+            reserve(&mut found, vr.len())?;
             instance.get(vr, &[BaseType::Binary], &mut |_, value| {
                 if let Value::Binary(bytes) = value {
                     found.push(bytes);
@@ -106,12 +107,17 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values: &[fmi3Binary] = in_slice(values, value_count, "values")?;
             let sizes = in_slice(sizes, value_count, "valueSizes")?;
-            let mut bytes = Vec::with_capacity(vr.len());
-            for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
-                let name = instance.name(*vr, BaseType::Binary)?;
-                bytes.push(Value::Binary(in_slice(*value, *size, name)?.to_vec()));
+            let bytes = |index: usize, name| in_slice(values[index], sizes[index], name);
+            for (index, of) in vr.iter().enumerate() {
+                let variable = instance.variable(*of, BaseType::Binary)?;
+                bytes(index, variable.name())?;
+                if let Some(why) = too_long(variable, sizes[index]) {
+                    return instance.reject_value(vr, &[BaseType::Binary], index, |_| why);
+                }
             }
-            instance.set(vr, &[BaseType::Binary], &|index| bytes[index].clone())
+            instance.set(vr, &[BaseType::Binary], &|index| {
+                Value::Binary(bytes(index, "values").unwrap_or_default().to_vec())
+            })
         })
     }
 }

@@ -18,6 +18,7 @@ mod values;
 
 pub(crate) use reference::{FromOne, Reference};
 pub(crate) use rejection::{Outcome, Rejection, discard, reject, reject_with};
+pub(crate) use values::too_long;
 
 use self::sorted::Sorted;
 use crate::capabilities::Events;
@@ -360,7 +361,7 @@ impl<M: Exported> Instance<M> {
 
     /// Returns the variable at this index, or an error if there is none or its type is not `base`.
     #[inline]
-    fn variable(&self, index: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
+    pub fn variable(&self, index: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
         match self.find(index) {
             Some(variable) if variable.base() == base => Ok(variable),
             other => self.reject_variable(index, other, base),
@@ -391,6 +392,14 @@ impl<M: Exported> Instance<M> {
             count += elements_of::<M>(index).count();
         }
         Ok(count)
+    }
+
+    /// Fails at the first reference without a variable.
+    pub fn check_references<R: Reference>(&self, vr: &[R]) -> Outcome {
+        match vr.iter().find(|vr| self.find(vr.index()).is_none()) {
+            Some(unknown) => self.reject_index(unknown.index()),
+            None => Ok(()),
+        }
     }
 
     fn reject_index<T>(&self, index: u32) -> Outcome<T> {

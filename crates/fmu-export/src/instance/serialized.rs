@@ -73,20 +73,22 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     if bytes[8..16] != guid_hash::<M>() {
         return reject("the saved state comes from another FMU (its guid differs)");
     }
-    let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM_LENGTH);
-    if fnv1a(EMPTY, content).to_le_bytes() != *checksum {
+    // The checksum follows the content. Because the content shows where it ends, no byte behind that is read.
+    let mut reader = Reader { rest: &bytes[HEADER_LENGTH..], valid: true };
+    state.visit(&mut reader);
+    let (rest, valid) = (reader.rest, reader.valid);
+    let content = &bytes[..bytes.len() - rest.len()];
+    if valid && (rest.len() != CHECKSUM_LENGTH || fnv1a(EMPTY, content).to_le_bytes() != *rest) {
         return reject("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
         return reject("the saved state contains impossible values");
     };
     from.check(origin)?;
-    let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
-    state.visit(&mut reader);
-    if !reader.rest.is_empty() {
-        return reject("the saved state has the wrong length");
+    if !valid {
+        return reject("the saved state is damaged, has the wrong length or contains impossible values");
     }
-    if !reader.valid || !ALL_MODES.contains(origin.0, origin.1, state.mode) {
+    if !ALL_MODES.contains(origin.0, origin.1, state.mode) {
         return reject("the saved state contains impossible values");
     }
     check(state)?;

@@ -162,9 +162,7 @@ impl<M: Exported> Instance<M> {
         bases: &[BaseType],
         each: &mut dyn FnMut(usize, Value),
     ) -> Outcome {
-        for vr in vr {
-            self.variable_of(vr.index(), bases)?;
-        }
+        self.check_types(vr, bases)?;
         let time = self.state.time;
         let model = self.calculated();
         for (index, vr) in vr.iter().enumerate() {
@@ -176,6 +174,11 @@ impl<M: Exported> Instance<M> {
             each(index, value);
         }
         Ok(())
+    }
+
+    /// Fails at the first reference without a variable of a type in `bases`.
+    pub fn check_types<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
+        vr.iter().try_for_each(|vr| self.variable_of(vr.index(), bases).map(drop))
     }
 
     fn variable_of(&self, index: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
@@ -340,6 +343,13 @@ pub(super) fn is_finite(sum: f64) -> bool {
     !(sum * 0.0).is_nan()
 }
 
+/// Returns the message for a Binary of `size` bytes, if the variable must be shorter.
+pub(crate) fn too_long<M>(variable: &Variable<M>, size: usize) -> Option<String> {
+    let Attributes::Binary { max_size, .. } = variable.variable_type().attributes else { return None };
+    let name = variable.name();
+    (size > max_size).then(|| format!("{name} must not have more than {max_size} bytes, it has {size}"))
+}
+
 /// Checks that a number is finite, that a parameter is in the range of its type, that an enumeration has the item,
 /// and that a Binary is not too long.
 pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
@@ -366,9 +376,10 @@ pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
             reject(format!("{name} must be one of {}, it is {value}", known.join(", ")))
         }
-        (Attributes::Binary { max_size, .. }, Value::Binary(value)) if value.len() > *max_size => {
-            reject(format!("{name} must not have more than {max_size} bytes, it has {}", value.len()))
-        }
+        (_, Value::Binary(value)) => match too_long(variable, value.len()) {
+            Some(why) => reject(why),
+            None => Ok(()),
+        },
         _ => Ok(()),
     }
 }

@@ -71,6 +71,12 @@ static u32 count(const Call *call, size_t n) {
     return call->endless ? UINT32_MAX : (u32)n;
 }
 
+/* Returns whether `n` times `each` bytes fit in the memory of an instance. If not, the importer's values must not be accessed,
+   because `n` may be wrong. */
+static inline bool fits(size_t n, size_t each) {
+    return n <= FMU_MEMORY / each;
+}
+
 /* Allocates `n` times `each` bytes for arguments, and `more` bytes for gaps and other arguments. Returns false if the
    memory is used up. If no array can have the length `n`, allocates nothing for it, because the module rejects it. */
 static inline bool reserve(Call *call, size_t n, size_t each, size_t more) {
@@ -80,7 +86,7 @@ static inline bool reserve(Call *call, size_t n, size_t each, size_t more) {
         call->endless = true;
         n = 0;
     }
-    if (n >= UINT32_MAX / 64 || more >= UINT32_MAX / 4) {
+    if (!fits(n, each) || more >= UINT32_MAX / 4) {
         return false;
     }
     size = n * each + more;
@@ -178,7 +184,7 @@ static u32 strings(Call *call, const fmi2String texts[], size_t n) {
 
 static size_t length_of_all(const fmi2String texts[], size_t n) {
     size_t i, sum = 0;
-    if (texts == NULL || (uintptr_t)texts % ALIGNMENT(fmi2String) != 0 || n > PTRDIFF_MAX / 8) {
+    if (texts == NULL || (uintptr_t)texts % ALIGNMENT(fmi2String) != 0 || !fits(n, sizeof(u32))) {
         return 0;
     }
     for (i = 0; i < n; i++) {

@@ -133,9 +133,23 @@ pub struct CallArguments {
     pub kind: i32,
     pub numbers: [f64; 3],
     faults: [Fault; 4],
-    /// Whether to pass a length that no array can have.
-    endless: bool,
+    /// A length that none of the arrays has, which is passed instead of their lengths.
+    wrong_length: Option<usize>,
 }
+
+/// Lengths of arrays that an importer may pass by mistake: negative numbers as unsigned ones, lengths in bytes, and numbers
+/// whose products overflow. Some would fit in the memory of the machine, some only in its address space.
+const WRONG_LENGTHS: [usize; 9] = [
+    usize::MAX,
+    isize::MAX as usize,
+    1 << 61,
+    1 << 60,
+    1 << 48,
+    1 << 32,
+    u32::MAX as usize,
+    i32::MAX as usize,
+    1 << 28,
+];
 
 /// Special numbers, which make up two thirds of the [`wild`] ones.
 #[rustfmt::skip]
@@ -202,6 +216,11 @@ fn like(function: &str) -> &str {
     }
 }
 
+/// Chooses a wrong length for one call in 64.
+pub fn wrong_length(u: &mut Unstructured) -> Result<Option<usize>> {
+    u.ratio(1, 64)?.then(|| u.choose(&WRONG_LENGTHS).copied()).transpose()
+}
+
 impl CallArguments {
     /// Decodes the arguments of a call to an instance that is at this time.
     pub fn decode(u: &mut Unstructured, function: &str, time: f64, variables: &Variables) -> Result<Self> {
@@ -248,7 +267,15 @@ impl CallArguments {
         }
         // Only a quarter of the calls choose among all strings, some of which are invalid.
         let good = if u.ratio(3, 4)? { &STRINGS[..5] } else { &STRINGS };
-        let vr = variables.references(u, count, function)?;
+        let mut vr = variables.references(u, count, function)?;
+        let mut categories = strings(u, count, &CATEGORIES)?;
+        let wrong_length = wrong_length(u)?;
+        if wrong_length.is_some() {
+            // The last element is invalid, because an FMU cannot notice a wrong length before the first invalid element.
+            vr.push(u32::MAX);
+            known.push(u32::MAX);
+            categories.push(c"%s%n".as_ptr());
+        }
         let (values, known_values) = (variables.values(&vr), variables.values(&known));
         Ok(Self {
             vr,
@@ -258,19 +285,24 @@ impl CallArguments {
             reals: reals(u, count.max(values).max(known_values))?,
             integers: array(count, || small(u))?,
             strings: strings(u, count, good)?,
-            categories: strings(u, count, &CATEGORIES)?,
+            categories,
             flags: [small(u)?, small(u)?],
             kind: small(u)?,
             numbers,
             known,
             faults,
-            endless: u.ratio(1, 64)?,
+            wrong_length,
         })
     }
 
     /// Returns the length to pass for an array of `count` values.
     pub fn count(&self, count: usize) -> usize {
-        if self.endless { usize::MAX } else { count }
+        self.wrong_length.unwrap_or(count)
+    }
+
+    /// Returns whether the passed lengths are wrong.
+    pub fn has_wrong_length(&self) -> bool {
+        self.wrong_length.is_some()
     }
 
     /// Returns the address to pass for an array with elements of `size` bytes. `array` is its real address, and `index` is

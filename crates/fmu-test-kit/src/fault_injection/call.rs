@@ -107,9 +107,9 @@ impl Call {
     fn count(&self, of: &str) -> usize {
         let (a, adjoint) = (&self.arguments, self.function.contains("Adjoint"));
         match of {
-            "n_known" => a.known.len(),
-            "n_seed" if !adjoint => a.known_values,
-            "n_sensitivity" if adjoint => a.known_values,
+            "n_known" => a.count(a.known.len()),
+            "n_seed" if !adjoint => a.count(a.known_values),
+            "n_sensitivity" if adjoint => a.count(a.known_values),
             "n_seed" | "n_sensitivity" => a.count(a.values),
             // Sometimes passes a wrong number of values.
             "n_value" => a.count(a.values).saturating_add((a.kind == 3).into()),
