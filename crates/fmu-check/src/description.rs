@@ -323,7 +323,7 @@ pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
 mod tests {
     use super::Description;
 
-    /// Variables of different types may have the same value reference in FMI 2.0 (section 2.2.7), so they are no aliases, and each may be
+    /// Variables of different types may have the same value reference in FMI 2.0 (section 2.2.7), so they are variables of their own, which may be
     /// read in other modes.
     #[test]
     fn references_belong_to_a_type() {
