@@ -4,7 +4,7 @@ use crate::call_sequence::Kind;
 use crate::rules::Observation;
 pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
-use fmi_abi::{BaseType, Standard};
+use fmi_abi::{BaseType, Standard, is_c_identifier};
 use std::collections::HashSet;
 use std::ops::Deref;
 
@@ -83,9 +83,11 @@ impl Description {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
-            // `ModelDescription::parse` rejects any other name that is not an identifier of C.
-            if offer.identifier.is_empty() {
+            let identifier = &offer.identifier;
+            if identifier.is_empty() {
                 wrong.push(("description.identifier", "modelIdentifier is missing or empty".to_owned()));
+            } else if !is_c_identifier(identifier) {
+                wrong.push(("description.identifier", format!("modelIdentifier is {identifier:?}")));
             }
         }
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();

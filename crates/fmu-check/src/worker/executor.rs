@@ -120,6 +120,8 @@ impl Executor {
         let location = standard.resources(&self.setting.resources);
         let resources = Guarded::new(location.as_bytes_with_nul());
         let word = |text: &Guarded| text.address() as usize as *const c_char;
+        // Section 2.3.1 of FMI 3.0.2: NULL if the FMU has no resources.
+        let has_resources = !self.setting.fmi3 || self.setting.resources.is_dir();
         // Each instance gets a different environment pointer. It is not a valid address, because the FMU must not dereference it.
         let environment = ENVIRONMENTS.fetch_add(ENVIRONMENT_STEP, Ordering::Relaxed) as *mut c_void;
         let mut callbacks = None;
@@ -135,7 +137,8 @@ impl Executor {
             return;
         };
         let find = |name: &str| (name == function).then_some(address);
-        let (instance_name, guid, location) = (word(&name), word(&token), word(&resources));
+        let (instance_name, guid) = (word(&name), word(&token));
+        let location = if has_resources { word(&resources) } else { std::ptr::null() };
         let logging = u8::from(make.logging);
         // SAFETY: the function has the type of the standard, and the arguments are as the standard requires.
         let handle = in_fmu(|| unsafe {

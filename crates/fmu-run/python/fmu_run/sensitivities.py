@@ -19,12 +19,14 @@ class Sensitivities(Mapping[tuple[str, str], _Array]):
     """Derivatives of trajectories, by output and parameter: found["roll", "k1"] is (times,), in the unit of the output per unit of the
     parameter.
 
-    Attributes
+    Parameters
     ----------
     time
         (times,): times, s.
     at
         The values of the parameters at which the derivatives are, in the units of the FMU, by name.
+    derivatives
+        The derivatives, (times,) each, by output and parameter.
     errors
         Estimated largest error of each derivative, by output and parameter.
     steps
