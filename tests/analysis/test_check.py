@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import struct
+import tracemalloc
+import zlib
 
 import numpy as np
 import pytest
@@ -236,14 +239,55 @@ def test_tables_that_cannot_be_read(fmu, tmp_path, text, message):
     assert str(path) in str(caught.value) and message in str(caught.value)
 
 
+def matrix(kind: int, sizes: tuple[int, int], content: bytes, name: bytes = b"time") -> bytes:
+    """Returns an array in MATLAB's format 5."""
+
+    def element(of: int, data: bytes) -> bytes:
+        return struct.pack("<II", of, len(data)) + data + bytes(-len(data) % 8)
+
+    header = element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack("<ii", *sizes)) + element(1, name)
+    return element(14, header + content)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "sizes", "content"),
+    [
+        pytest.param(6, (1 << 15, 1 << 15), struct.pack("<II", 9, 8) + bytes(8), id="declared numbers"),
+        pytest.param(1, (1 << 15, 1 << 15), b"", id="declared cells"),
+        pytest.param(6, (1, 1 << 18), struct.pack("<II", 2, 1 << 18) + bytes(1 << 18), id="small numbers"),
+        pytest.param(6, (1, 1 << 18), struct.pack("<II", 9, 1 << 21) + bytes(1 << 21), id="numbers"),
+    ],
+)
+def test_mat_files_may_not_be_large(fmu, tmp_path, monkeypatch, kind, sizes, content, compressed):
+    """The memory is limited by the size that a file declares, before it is read."""
+    monkeypatch.setattr("prw.checking.result.LARGEST", 1 << 20)
+    path, data = tmp_path / "run.mat", matrix(kind, sizes, content)
+    if compressed:
+        data = zlib.compress(data, 1)
+        data = struct.pack("<II", 15, len(data)) + data
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + data)
+    tracemalloc.start()
+    try:
+        with pytest.raises(
+            prw.UserError, match=r"run.mat: (has more than 1 MB of values|cannot be read as a \.mat file)"
+        ):
+            prw.check(path, fmu=fmu)
+        assert tracemalloc.get_traced_memory()[1] < 10 << 20
+    finally:
+        tracemalloc.stop()
+
+
 def test_mat_files_that_cannot_be_read(fmu, tmp_path):
     path = tmp_path / "run.mat"
     path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + b"\x89HDF\r\n\x1a\n" * 9)
     with pytest.raises(prw.UserError, match=r"format 7.3; save it with: save\('run.mat', ..., '-v7'\)"):
         prw.check(path, fmu=fmu)
-    path.write_bytes(b"something else")
-    with pytest.raises(prw.UserError, match="cannot be read as a .mat file"):
-        prw.check(path, fmu=fmu)
+    nested = matrix(1, (1, 1), matrix(1, (1 << 15, 1 << 15), b"", b""))
+    for content in (b"something else", b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + nested):
+        path.write_bytes(content)
+        with pytest.raises(prw.UserError, match="cannot be read as a .mat file"):
+            prw.check(path, fmu=fmu)
     savemat(path, {"roll": np.zeros(3)})
     with pytest.raises(prw.UserError, match="no vector time or tout; it has .*roll; save time and signals as vectors"):
         prw.check(path, fmu=fmu)

@@ -223,3 +223,44 @@ def test_the_old_result_stays(tmp_path: Path, fmu: Path, ended: Any) -> None:
     else:
         assert result.returncode == 1 and left == []
         assert "long.csv: cannot be written" in result.stderr and result.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="shells of POSIX close streams")
+@pytest.mark.parametrize(
+    ("streams", "status", "message"),
+    [
+        (">/dev/full", 1, "prw simulate: the output cannot be written (No space left on device)\n"),
+        (">&-", 0, ""),
+        ("2>&-", 0, ""),
+        ("<&- >&- 2>&-", 0, ""),
+        ("nothing.csv 2>/dev/full", 1, ""),
+        ("nothing.csv 2>&-", 1, ""),
+    ],
+)
+def test_standard_streams_that_cannot_be_used(
+    tmp_path: Path, fmu: Path, streams: str, status: int, message: str
+) -> None:
+    if "/dev/full" in streams and not os.path.exists("/dev/full"):
+        pytest.skip("needs /dev/full")
+    (tmp_path / "short.csv").write_text("time,theta1,theta2\n0,0,0\n0.01,0,0\n")
+    file = "" if "nothing" in streams else "short.csv"
+    command = f'exec "{sys.executable}" -m prw simulate --fmu "{fmu}" {file} {streams}'
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (status, message)
+    assert (tmp_path / "out" / "short.csv").exists() == bool(file)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems reject these names")
+@pytest.mark.parametrize("name", [b"two\nlines.csv", b"not UTF-8 \xff.csv"])
+def test_names_of_files_may_have_any_bytes(prw: Any, tmp_path: Path, name: bytes) -> None:
+    path = os.fsdecode(name)
+    (tmp_path / path).write_text("time,theta1,theta2\n0,0,0\n0.01,0,0\n")
+    done = prw("simulate", path)
+    assert done.returncode == 0 and (tmp_path / "out" / path).exists()
+    assert all(re.match("[a-z ]{12}", line) for line in done.stdout.splitlines()), done.stdout
+
+
+def test_times_are_limited(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "huge.csv").write_text("time,theta1,theta2\n0,0,0\n1e308,0,0\n")
+    done = prw("simulate", "huge.csv")
+    assert done.returncode == 1 and "time reaches 1e+308 s; it must be between" in done.stderr

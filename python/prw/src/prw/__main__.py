@@ -1,7 +1,19 @@
-"""`python -m prw` is the command `prw`."""
+"""The command `prw`, also as `python -m prw`."""
 
 import sys
 
-from prw.cli import main
 
-sys.exit(main())
+def main() -> int:
+    """Run `prw`. Returns the exit status, 130 also for an interrupt during the imports, which take most of the time of short
+    commands."""
+    try:
+        from prw.cli import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        print("\nprw: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import signal
@@ -35,6 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run(program: str, description: str, commands: Mapping[str, ModuleType], argv: Sequence[str] | None) -> int:
     """Run one of the commands as `program COMMAND ...`."""
+    _open_streams()
     parser = argparse.ArgumentParser(prog=program, description=description)
     parser.add_argument("--version", action="version", version=f"{program} {version('prw')}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
@@ -56,15 +58,19 @@ def run(program: str, description: str, commands: Mapping[str, ModuleType], argv
     except UserError as error:
         default = f"--{error.argument}" if hasattr(arguments, error.argument) else error.argument
         option = {**OPTIONS, **arguments.options}.get(error.argument, default)
-        print(f"{program} {arguments.command}: {one_line(option)}{error.detail}", file=sys.stderr)
+        report(f"{program} {arguments.command}: {one_line(option)}{error.detail}")
         return error.status
     except KeyboardInterrupt as interrupt:
         what = f"; {interrupt}" if str(interrupt) else ""
-        print(f"\n{program} {arguments.command}: interrupted{what}", file=sys.stderr)
+        report(f"\n{program} {arguments.command}: interrupted{what}")
         return 130
-    except BrokenPipeError:
-        # The reader has closed the pipe (`prw ... | head`); a write at exit would raise again.
+    except OSError as error:
+        # Errors of files are UserErrors, so this is the standard output. A write at exit would raise again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader may close the pipe: `prw ... | head`.
+        if not isinstance(error, BrokenPipeError):
+            report(f"{program} {arguments.command}: the output cannot be written ({error.strerror or error})")
+            return 1
     finally:
         if before is not None:
             signal.signal(signal.SIGTERM, before)
@@ -79,6 +85,19 @@ def _hint(unknown: str, argv: Sequence[str] | None, arguments: argparse.Namespac
     if not hasattr(arguments, "parameters") or not re.fullmatch(r"--\w+", name) or not re.fullmatch(r"[\d.]\S*", value):
         return ""
     return f"; a parameter is set by --set {name.removeprefix('--')}={value}"
+
+
+def report(message: str) -> None:
+    """Print a message on the standard error, unless that cannot be written."""
+    with contextlib.suppress(OSError):
+        print(message, file=sys.stderr)
+
+
+def _open_streams() -> None:
+    """Replace closed standard streams (`prw ... >&-`) by the null device, so that no file gets their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
 
 
 def _end_on_sigterm() -> Any:

@@ -11,6 +11,8 @@ from typing import Any
 
 #: Number of characters after which a message is cut.
 LONGEST = 1000
+#: Number of characters after which a value in a message is cut.
+SHOWN = 200
 #: The packages that `make study` installs in a clone.
 STUDY = {"matplotlib", "scipy", "threadpoolctl", "jinja2", "pyarrow", "distributed"}
 
@@ -48,7 +50,8 @@ class UserError(ValueError):
 
     def __init__(self, message: str, *, argument: str = "", given: Any = ""):
         self.argument = argument
-        self.detail = one_line(f"{f' {given}'.rstrip()}: {message}" if argument else message)
+        shown = one_line(f" {given}".rstrip(), SHOWN)
+        self.detail = one_line(f"{shown}: {message}" if argument else message)
         super().__init__(argument + self.detail)
 
 

@@ -20,6 +20,10 @@ FIG4_FREQUENCY = 10 * np.pi
 FIG4_DURATION = 2.0
 
 
+#: Largest absolute value of a time, s. Beyond a million years, samples of a controller would have equal times.
+LATEST = 3e13
+
+
 @dataclass(frozen=True)
 class Motion:
     """Motor motion at the communication points.
@@ -68,6 +72,8 @@ class Motion:
                 )
         if not (np.diff(self.time) > 0).all():
             raise UserError("motion: time must increase from sample to sample")
+        if (latest := np.abs(self.time).max()) > LATEST:
+            raise UserError(f"motion: time reaches {latest:g} s; it must be between -{LATEST:g} s and {LATEST:g} s")
         continued = [unwrapped(name, self.time, column) for name, column in zip(ANGLES, self.theta.T)]
         notes = [note for _, note in continued if note]
         if notes:

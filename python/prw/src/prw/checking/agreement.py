@@ -15,7 +15,7 @@ import numpy as np
 from prw.checking.experiments import Experiment
 from prw.checking.result import Result
 from prw.columns import MOTORS, si_unit
-from prw.errors import UserError, need
+from prw.errors import UserError, need, one_line
 from prw.files import write_text
 from prw.motion import Array
 
@@ -107,7 +107,7 @@ class Agreement:
     def summary(self) -> str:
         """The compared files and the difference of each output, in a few lines."""
         lines = [
-            f"compared    {self.source} with {self.experiment.name} ({self.experiment.description})",
+            f"compared    {one_line(str(self.source))} with {self.experiment.name} ({self.experiment.description})",
             f"            {len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s, tolerances for {self.interface}",
         ]
         for name, found in self.variables.items():
@@ -147,7 +147,7 @@ class Agreement:
             found = differences[name]
             off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
             panels.append(Panel(off, found.unit.replace(".", " "), curves))
-        return draw_panels(f"{self.source.name} and {self.experiment.name}", self.time, panels, 1.9)
+        return draw_panels(f"{one_line(self.source.name)} and {self.experiment.name}", self.time, panels, 1.9)
 
     def __repr__(self) -> str:
         return self.summary()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import os
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +21,12 @@ from prw.table import read_table
 
 #: The title of a column: the components, which end with dots in Modelica and SSP and with slashes in Simulink, then the name.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
+#: Maximum memory of the values in a .mat file, in bytes.
+LARGEST = 256 << 20
+#: Bytes of a value in memory, by the name of the type in `scipy.io.whosmat`; 8 for all others. An element of a cell array or of an
+#: array of structures is a Python object.
+_BYTES = {"single": 4, "int32": 4, "uint32": 4, "int16": 2, "uint16": 2, "int8": 1, "uint8": 1, "logical": 1, "char": 4}
+_BYTES |= {"cell": 1000, "struct": 1000}
 #: The default component if columns of several components have the same name.
 TESTBED = "testbed"
 
@@ -124,9 +133,9 @@ def _mat(path: Path) -> dict[str, Array]:
     """The columns of a .mat file by title. Raises UserError if it cannot be read or contains no time."""
     need("scipy")
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
     try:
+        _check_size(path)
         content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
         if "dataInfo" in content:
             return _modelica(path, loadmat(path, chars_as_strings=False))
@@ -134,8 +143,9 @@ def _mat(path: Path) -> dict[str, Array]:
         raise
     except NotImplementedError:
         raise UserError(f"{path}: is of MATLAB's format 7.3; save it with: save('{path.name}', ..., '-v7')") from None
-    except (OSError, ValueError, TypeError, MatReadError) as error:
-        raise UserError(f"{path}: cannot be read as a .mat file ({error})") from None
+    # A malformed file can cause nearly any error in the reader.
+    except Exception as error:
+        raise UserError(f"{path}: cannot be read as a .mat file ({str(error) or type(error).__name__})") from None
     columns: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith("__"):
@@ -145,6 +155,38 @@ def _mat(path: Path) -> dict[str, Array]:
         hint = "; save time and signals as vectors: save('run.mat', 'time', 'roll', ..., '-v7')"
         raise UserError(f"{path}: there is no vector time or tout; it has {shown(list(content))}{hint}")
     return {name: values for name, values in columns.items() if len(values) == lengths[0]}
+
+
+def _check_size(path: Path) -> None:
+    """Raises UserError if the arrays of a .mat file take more memory than allowed: a file of a few bytes may declare or contain, in
+    compressed form, arrays of any size."""
+    from scipy.io import whosmat
+
+    too_large = UserError(
+        f"{path}: has more than {LARGEST >> 20} MB of values; save only time, motors and outputs, or fewer samples"
+    )
+    with open(path, "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        header = file.read(128)
+        if header[126:128] == b"IM" and header[124:126] == b"\x00\x01":
+            # Format 5: elements with the type and the number of bytes, some of which are compressed (15).
+            size = 128
+            while len(tag := file.read(8)) == 8:
+                kind, length = np.frombuffer(tag, "<u4").tolist()
+                inflate, rest = zlib.decompressobj(), length
+                while kind == 15 and rest and (chunk := file.read(min(rest, 1 << 16))):
+                    rest -= len(chunk)
+                    while chunk and size <= LARGEST:
+                        size += len(inflate.decompress(chunk, 1 << 20))
+                        chunk = inflate.unconsumed_tail
+                size += rest
+                if size > LARGEST:
+                    raise too_large
+                file.seek(rest, os.SEEK_CUR)
+    values = sum(math.prod(shape) * _BYTES.get(kind, 8) for _, shape, kind in whosmat(path))
+    # Values of small types are stored in less space than they take, and structures contain further arrays.
+    if max(size, values) > LARGEST:
+        raise too_large
 
 
 def _is_time(title: str) -> bool:

@@ -14,7 +14,7 @@ import json
 import numpy as np
 
 from prw.arguments import positive
-from prw.commands.options import add_paths, add_task_options, call, listed
+from prw.commands.options import add_paths, add_task_options, call, listed, show
 from prw.errors import need
 from prw.files import write_table, write_text
 from prw.identification.excitation import excite
@@ -72,17 +72,17 @@ def run(arguments: argparse.Namespace) -> None:
     }
     write_text(arguments.out / "ranking.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
     measured = ", ".join(best.noise)
-    print(
+    show(
         f"expected standard errors of one experiment of {arguments.duration:g} s at {arguments.rate:g} Hz, measuring {measured}"
     )
-    print(f"  {'motion':<28}{'typical':>9}" + "".join(f"{name:>9}" for name in best.expected_errors))
+    show(f"  {'motion':<28}{'typical':>9}" + "".join(f"{name:>9}" for name in best.expected_errors))
     for entry in ranking:
         errors = (entry.typical_error, *entry.expected_errors.values())
-        print(f"  {entry.name:<28}" + "".join(f"{_percent(error):>9}" for error in errors))
+        show(f"  {entry.name:<28}" + "".join(f"{_percent(error):>9}" for error in errors))
     for combination in best.undetermined:
-        print(f"note        even the best: {combination}")
-    print(f"wrote       {len(ranking)} motions and ranking.json into {arguments.out}")
-    print(f"next        look at the best: prw simulate {arguments.out / best.name}.csv")
+        show(f"note        even the best: {combination}")
+    show(f"wrote       {len(ranking)} motions and ranking.json into {arguments.out}")
+    show(f"next        look at the best: prw simulate {arguments.out / best.name}.csv")
 
 
 def _percent(value: float) -> str:

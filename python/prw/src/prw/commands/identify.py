@@ -26,6 +26,7 @@ from prw.commands.options import (
     call,
     listed,
     number,
+    show,
     spread,
 )
 from prw.errors import DoesNotFit, UserError, need
@@ -123,7 +124,7 @@ def run(arguments: argparse.Namespace) -> None:
     if wrong or found.undetermined:
         parameters.unlink(missing_ok=True)
         ssv.unlink(missing_ok=True)
-        print(f"wrote       {report}, {numbers_}")
+        show(f"wrote       {report}, {numbers_}")
     if wrong:
         channels = ", ".join(dict.fromkeys(misfit.channel for misfit in found.verdict.misfits))
         causes = found.diagnosis_in(command=True)
@@ -140,10 +141,10 @@ def run(arguments: argparse.Namespace) -> None:
         )
     found.to_parameters(parameters)
     found.to_ssv(ssv)
-    print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
+    show(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
     if not found.fits:
         raise DoesNotFit("the FMU does not explain the data; the parameters that were written are not reliable")
-    print(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
+    show(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
 
 
 def _quantum(string: str | None) -> float:

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.options import DEFAULT_OUT, FMU, add_parameter_options, parameters_of
+from prw.commands.options import DEFAULT_OUT, FMU, add_parameter_options, parameters_of, show
 from prw.files import write_text
 from prw.linearization import linearize
 from prw.state_space import StateSpace
@@ -34,9 +34,9 @@ def run(arguments: argparse.Namespace) -> None:
     model = linearize(parameters_of(arguments), fmu=arguments.fmu)
     write_text(arguments.out, json.dumps(content(model), indent=2) + "\n")
     for kind in ("states", "inputs", "outputs"):
-        print(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")
-    print(f"poles       {', '.join(f'{pole:.6g}' for pole in model.poles()) or 'none'} (1/s)")
-    print(f"wrote       {arguments.out}")
+        show(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")
+    show(f"poles       {', '.join(f'{pole:.6g}' for pole in model.poles()) or 'none'} (1/s)")
+    show(f"wrote       {arguments.out}")
 
 
 def content(model: StateSpace) -> dict[str, Any]:

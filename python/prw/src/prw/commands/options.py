@@ -6,13 +6,14 @@ import argparse
 import inspect
 import math
 import re
+import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 from prw.arguments import values_of
-from prw.errors import UserError
+from prw.errors import UserError, one_line
 from prw.identification import DEFAULT_ESTIMATE
 from prw.testbed import existing_fmu, loaded
 
@@ -30,6 +31,11 @@ def call(function: Callable[..., T], arguments: argparse.Namespace, **others: An
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=__name__)
         return function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
+
+
+def show(*lines: str) -> None:
+    """Print lines. A name in a line, such as a path, may contain any character, but does not break the line."""
+    print("\n".join(one_line(line, sys.maxsize) for line in lines))
 
 
 def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write into", directory: str = "") -> None:

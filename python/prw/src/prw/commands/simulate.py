@@ -20,8 +20,9 @@ from prw.commands.options import (
     add_reading_options,
     call,
     parameters_of,
+    show,
 )
-from prw.errors import MissingPackage, UserError
+from prw.errors import MissingPackage, UserError, one_line
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
     recorded = arguments.input is not None
     if recorded:
         motion = call(read_motion, arguments, path=arguments.input)
-        title = f"Response to {arguments.input.name}"
+        title = f"Response to {one_line(arguments.input.name)}"
     else:
         if arguments.degrees is not None:
             raise UserError("--degrees and --radians belong to a recording; the paper's experiment is in radians")
@@ -97,7 +98,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.animate is not None:
         animate(response, arguments.animate)
         written.append(arguments.animate)
-    print("\n".join(_summary(arguments, response, given, written, missing)))
+    show(*_summary(arguments, response, given, written, missing))
 
 
 def write_png(path: Path, figure: Figure) -> None:

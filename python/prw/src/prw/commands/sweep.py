@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT, Named, add_paths, add_unit_options, call, listed, spread
+from prw.commands.options import DEFAULT_OUT, Named, add_paths, add_unit_options, call, listed, show, spread
 from prw.draws import SAMPLINGS
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
@@ -135,16 +135,16 @@ def run(arguments: argparse.Namespace) -> None:
     )
     seconds, count = time.monotonic() - begin, table.num_rows - earlier
     if earlier:
-        print(f"kept        {earlier} finished runs in {arguments.out}")
+        show(f"kept        {earlier} finished runs in {arguments.out}")
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
-    print(f"ran         {count} runs on {where} in {seconds:.1f} s ({count / seconds:.0f} per second)")
+    show(f"ran         {count} runs on {where} in {seconds:.1f} s ({count / seconds:.0f} per second)")
     status = table.column("status").to_pylist()
     if failed := status.count("failed"):
         first = status.index("failed")
-        print(f"failed      {failed} runs; run {first}: {table.column('message')[first]}")
+        show(f"failed      {failed} runs; run {first}: {table.column('message')[first]}")
     if arguments.again is not None:
         unlike = repeated(arguments.again, table)
         verdict = f"other values in {', '.join(unlike)}" if unlike else "all values are equal"
-        print(f"repeated    {arguments.again}: {verdict}")
+        show(f"repeated    {arguments.again}: {verdict}")
     more = f", {arguments.out / TRAJECTORIES}" if (arguments.out / TRAJECTORIES).is_dir() else ""
-    print(f"wrote       {arguments.out / TABLE}{more}")
+    show(f"wrote       {arguments.out / TABLE}{more}")
