@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+import tracemalloc
 import warnings
+import zipfile
 
 import fmpy
 import fmu_run
@@ -266,3 +268,45 @@ def test_the_programs_run(fmu, monkeypatch, capsys):
     assert len(shapes) == 6
     for expression, name, shape in shapes:
         assert str(np.shape(eval(expression or name, names))) == shape, expression or name
+
+
+def test_arrays_may_be_written_meanwhile(testbed) -> None:
+    """Another thread may write to the arrays of the caller while FMUs run without the GIL."""
+    time, steps = np.arange(100_000) * 1e-3, []
+    moves = np.stack([np.full(len(time), k / 64) for k in range(64)])
+
+    def overwrite(*done: int) -> None:
+        steps.append(done)
+        time.fill(np.nan)
+        moves.fill(np.nan)
+
+    with fmu_run.Fmu(testbed) as fmu:
+        runs = fmu.run(time, inputs={"theta1": moves}, outputs=["pitch"], measures=["end"], progress=overwrite)
+        assert runs.ok.all() and steps and np.isnan(moves).all()
+        assert np.allclose(runs["pitch", "end"], np.arange(64) / 128)
+        wrists, shared = fmu.instances(3), np.zeros((3, 2))
+        assert wrists.advance(("theta1", "theta2"), shared, 1e-3, ("theta1", "M"), out=shared) is shared
+        assert (shared == [0.0, 4.0]).all()
+
+
+def test_elements_of_arrays_share_their_attributes(faulty_fmu3, tmp_path) -> None:
+    for count, letters in [(1000, 100), (100_000, 1), (100_000, 10_000)]:
+        path = tmp_path / f"{count}_{letters}.fmu"
+        text = "d" * letters
+        array = (
+            f'<Float64 name="a" valueReference="9999" causality="local" description="{text}" quantity="{text}">'
+            f'<Dimension start="{count}"/></Float64></ModelVariables>'
+        )
+        with zipfile.ZipFile(faulty_fmu3) as before, zipfile.ZipFile(path, "w") as after:
+            for name in before.namelist():
+                content = before.read(name)
+                if name == "modelDescription.xml":
+                    content = content.replace(b"</ModelVariables>", array.encode())
+                after.writestr(name, content)
+        tracemalloc.start()
+        with fmu_run.Fmu(path) as fmu:
+            opened = tracemalloc.get_traced_memory()[1]
+            assert len(fmu.variables) >= count and fmu.variables[f"a[{count}]"].description == text
+        listed = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert opened < 200_000 and listed < 300_000 + 300 * count, (count, letters, opened, listed)

@@ -4,7 +4,7 @@ use crate::call_sequence::Kind;
 use crate::rules::Observation;
 pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
-use fmi_abi::{BaseType, Standard, is_c_identifier};
+use fmi_abi::{BaseType, Standard, is_c_identifier, shown};
 use std::collections::HashSet;
 use std::ops::Deref;
 
@@ -113,12 +113,15 @@ impl Description {
                 add("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit)) {
-                let why = format!("{name} is in {unit:?}, which is not a unit of UnitDefinitions");
+                let why = format!("{name} is in \"{}\", which is not a unit of UnitDefinitions", shown(unit));
                 add("description.units", why);
             }
             let declared = variable.declared_type.as_ref();
             if let Some(declared) = declared.filter(|declared| !self.types.contains(*declared)) {
-                let why = format!("{name} is of type {declared:?}, which is not among the TypeDefinitions");
+                let why = format!(
+                    "{name} is of type \"{}\", which is not among the TypeDefinitions",
+                    shown(declared)
+                );
                 add("description.types", why);
             }
             if variable.display_unit.is_some() && variable.unit.is_none() {

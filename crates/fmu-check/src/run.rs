@@ -301,7 +301,7 @@ fn crash(code: Option<i32>, signal: Option<i32>, output: &str) -> String {
         (libc::SIGFPE, "SIGFPE: integer division by zero or overflow, or a trapped floating-point exception"),
         (libc::SIGILL, "SIGILL: illegal instruction"),
         (libc::SIGKILL, "SIGKILL: killed by the process itself or by the out-of-memory killer"),
-        (libc::SIGSYS, "SIGSYS: it sent a signal to processes outside of its session"),
+        (libc::SIGSYS, "SIGSYS: it sent a signal to processes outside of its session, or changed them"),
         (libc::SIGXFSZ, "SIGXFSZ: it wrote more than 1 GiB to a file"),
     ];
     #[cfg(not(unix))]

@@ -2,20 +2,23 @@
 
 use super::open;
 use crate::{shown, xml::reserve};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 use zip::ZipArchive;
 
 /// Upper bound for the memory that an entry of an archive's directory takes, in bytes.
 const ENTRY: usize = 1000;
+/// Maximum number of nested directories. Each level makes the access to the files in it slower.
+const MAX_DEPTH: usize = 100;
 
 /// Limits for the content of an archive.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Maximum number of bytes of all files together, unpacked.
     pub bytes: u64,
-    /// Maximum number of files and directories.
+    /// Maximum number of files and directories, including directories that have no entry of their own.
     pub entries: usize,
 }
 
@@ -37,8 +40,9 @@ pub struct Entry<'a> {
 }
 
 /// Unpacks the ZIP file `path` into the directory `to`; messages call the file `what`, for example "an FMU". `wanted`
-/// returns whether an entry is extracted. Entries outside of the directory are never extracted, and neither are links,
-/// because a link could lead outside. The number of all entries and the extracted bytes are subtracted from `limits`.
+/// returns whether an entry is extracted. If several entries have the same name, `wanted` is called for each of them, but only
+/// the last one is extracted. Entries outside of the directory are never extracted, and neither are links, because a link could
+/// lead outside. The number of all entries and created directories and the extracted bytes are subtracted from `limits`.
 /// Permissions are ignored, because some tools write entries that the owner could not read, but programs stay
 /// executable.
 ///
@@ -54,7 +58,8 @@ pub fn unpack(
     let mut file = open(path)?;
     let mut start = [0; 64];
     let length = file.read(&mut start).map_err(|error| format!("cannot be read ({error})"))?;
-    check_count(declared_count(&mut file).unwrap_or_default(), *limits)?;
+    let declared = declared_count(&mut file).unwrap_or_default();
+    check_count(declared, *limits)?;
     let mut archive = ZipArchive::new(file).map_err(|error| {
         let error = error.to_string();
         let why = instead(&start[..length])
@@ -69,12 +74,47 @@ pub fn unpack(
     if archive.decompressed_size().is_some_and(|size| size > u128::from(most)) {
         return Err(too_large());
     }
+    let fail = |why: String| format!("cannot be unpacked ({why})");
+    if declared > archive.len() as u64 {
+        for name in repeated_names(path, archive.central_directory_start()) {
+            wanted(&Entry { name: &name, is_inside: true, compression: None }).map_err(fail)?;
+        }
+    }
     for index in 0..archive.len() {
-        let written = extract(&mut archive, index, to, limits.bytes, wanted)
-            .map_err(|why| format!("cannot be unpacked ({why})"))?;
+        let written = extract(&mut archive, index, to, limits, wanted).map_err(fail)?;
         limits.bytes = limits.bytes.checked_sub(written).ok_or_else(too_large)?;
     }
     Ok(())
+}
+
+/// Returns the names that several entries of the archive's directory have, once for each repetition. [`ZipArchive`] keeps only
+/// the last of these entries.
+fn repeated_names(path: &Path, start: u64) -> Vec<String> {
+    /// Length of the part of an entry before its name.
+    const FIXED: usize = 46;
+    let (mut seen, mut repeated) = (HashSet::new(), Vec::new());
+    let mut read = || -> std::io::Result<()> {
+        let mut file = std::io::BufReader::new(File::open(path)?);
+        file.seek(SeekFrom::Start(start))?;
+        let mut fixed = [0; FIXED];
+        loop {
+            file.read_exact(&mut fixed)?;
+            if !fixed.starts_with(b"PK\x01\x02") {
+                return Ok(());
+            }
+            let length = |at: usize| u16::from_le_bytes([fixed[at], fixed[at + 1]]);
+            let mut name = vec![0; length(28).into()];
+            file.read_exact(&mut name)?;
+            file.seek_relative(i64::from(length(30)) + i64::from(length(32)))?;
+            let name = String::from_utf8_lossy(&name).into_owned();
+            if !seen.insert(name.clone()) {
+                repeated.push(name);
+            }
+        }
+    };
+    // A directory that cannot be read to its end has no further entries.
+    _ = read();
+    repeated
 }
 
 fn check_count(count: u64, limits: Limits) -> Result<(), String> {
@@ -103,12 +143,13 @@ fn declared_count(file: &mut File) -> Option<u64> {
     short.map(u64::from).max(long)
 }
 
-/// Extracts an entry and returns its size in bytes: 0 if nothing is written, `most` + 1 if it is larger than `most`.
+/// Extracts an entry and returns its size in bytes: 0 if no file is written, more than the limit if the file is larger.
+/// Subtracts the directories that it creates from the limit of entries.
 fn extract(
     archive: &mut ZipArchive<File>,
     index: usize,
     directory: &Path,
-    most: u64,
+    limits: &mut Limits,
     wanted: &mut dyn FnMut(&Entry) -> Result<bool, String>,
 ) -> Result<u64, String> {
     let mut entry = archive.by_index(index).map_err(|error| shown(&error.to_string()).into_owned())?;
@@ -127,27 +168,53 @@ fn extract(
         return Ok(0);
     }
     // Omits `.` from the path, because some tools write an entry `./`, and creating that directory would fail.
-    let mut to = directory.to_owned();
-    to.extend(path.components().filter(|part| matches!(part, Component::Normal(_))));
+    let parts: Vec<_> = path.components().filter(|part| matches!(part, Component::Normal(_))).collect();
+    let to = directory.join(parts.iter().collect::<PathBuf>());
     let message = |error: std::io::Error| format!("{}: {error}", shown(&name));
-    if relative.ends_with('/') {
-        return std::fs::create_dir_all(&to).map_err(message).map(|()| 0);
+    let is_directory = relative.ends_with('/');
+    if !is_directory && entry.size() > limits.bytes {
+        return Ok(limits.bytes + 1);
     }
-    if entry.size() > most {
-        return Ok(most + 1);
+    let directories =
+        if is_directory { &*parts } else { parts.split_last().map_or(&[][..], |(_, above)| above) };
+    if directories.len() > MAX_DEPTH {
+        return Err(format!("{} is in more than {MAX_DEPTH} nested directories", shown(&name)));
     }
-    if let Some(parent) = to.parent() {
-        std::fs::create_dir_all(parent).map_err(message)?;
+    let created = create(directory, directories).map_err(message)?;
+    let too_many = "it has too many directories for the limit for archives";
+    limits.entries = limits.entries.checked_sub(created).ok_or(too_many)?;
+    if is_directory {
+        return Ok(0);
     }
     let mut file = File::create(&to).map_err(message)?;
     // The size that the entry declares may be wrong, so the copy is limited as well.
-    let size = std::io::copy(&mut (&mut entry).take(most + 1), &mut file).map_err(message)?;
+    let size = std::io::copy(&mut (&mut entry).take(limits.bytes + 1), &mut file).map_err(message)?;
     #[cfg(unix)]
     if entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0) {
         use std::os::unix::fs::PermissionsExt;
         file.set_permissions(std::fs::Permissions::from_mode(0o755)).map_err(message)?;
     }
     Ok(size)
+}
+
+/// Creates nested directories in `directory`, unless they exist, and returns their number. Creates `directory`, too.
+fn create(directory: &Path, nested: &[Component]) -> std::io::Result<usize> {
+    let mut path = directory.join(nested.iter().collect::<PathBuf>());
+    if path.is_dir() {
+        return Ok(0);
+    }
+    std::fs::create_dir_all(directory)?;
+    path = directory.to_owned();
+    let mut created = 0;
+    for part in nested {
+        path.push(part);
+        match std::fs::create_dir(&path) {
+            Ok(()) => created += 1,
+            Err(_) if path.is_dir() => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(created)
 }
 
 /// Returns what a file seems to be instead of a zip file, judged by its first bytes; `None` if this is unknown.
@@ -221,6 +288,64 @@ mod tests {
         std::fs::write(&path, changed).unwrap();
         assert!(unpacked(1000, 3).is_err());
         assert!(std::fs::metadata(to.join("a")).unwrap().len() <= 1001);
+    }
+
+    /// Packs empty files with these names.
+    fn packed(path: &std::path::Path, names: impl IntoIterator<Item = String>) {
+        let mut archive = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+        for name in names {
+            archive.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        }
+        archive.finish().unwrap();
+    }
+
+    #[test]
+    fn directories_count_as_entries() {
+        let directory = tempfile::tempdir().unwrap();
+        let (path, to) = (directory.path().join("archive"), directory.path().join("to"));
+        // Few files, each in many directories.
+        for (files, depth, entries) in [(1, 100, 101), (10, 50, 510), (100, 9, 1000)] {
+            packed(&path, (0..files).map(|file| format!("{file}/").repeat(depth) + "x"));
+            for limit in [entries - 1, entries] {
+                let mut limits = Limits { entries: limit, ..Limits::default() };
+                let unpacked = unpack(&path, "an FMU", &to, &mut limits, &mut |_| Ok(true));
+                assert_eq!(
+                    unpacked.is_ok(),
+                    limit == entries,
+                    "{files} files, {depth} directories: {unpacked:?}"
+                );
+                assert!(unpacked.is_ok() || unpacked.unwrap_err().contains("limit for archives"));
+                std::fs::remove_dir_all(&to).unwrap();
+            }
+        }
+        packed(&path, ["d/".repeat(101) + "x"]);
+        let deep = unpack(&path, "an FMU", &to, &mut Limits::default(), &mut |_| Ok(true));
+        assert!(deep.unwrap_err().contains("is in more than 100 nested directories"));
+    }
+
+    #[test]
+    fn repeated_names_are_reported() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("archive");
+        packed(&path, ["aaaa", "abbb", "abbc", "abbd"].map(str::to_owned));
+        // The writer of archives rejects repeated names.
+        let bytes = std::fs::read(&path).unwrap();
+        let changed = String::from_utf8(bytes.iter().map(|byte| byte & 0x7f).collect()).unwrap();
+        let mut bytes = bytes;
+        for name in ["abbc", "abbd"] {
+            changed.match_indices(name).for_each(|(at, _)| bytes[at..at + 4].copy_from_slice(b"abbb"));
+        }
+        for prefix in [&b""[..], b"a program before the archive"] {
+            std::fs::write(&path, [prefix, &bytes].concat()).unwrap();
+            let mut names = Vec::new();
+            unpack(&path, "an FMU", &directory.path().join("to"), &mut Limits::default(), &mut |entry| {
+                names.push(entry.name.to_owned());
+                Ok(true)
+            })
+            .unwrap();
+            names.sort_unstable();
+            assert_eq!(names, ["aaaa", "abbb", "abbb", "abbb"]);
+        }
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub fn unpack(path: &Path, directory: &Path, max_bytes: u64) -> anyhow::Result<V
     }
 }
 
-/// Checks an entry of a ZIP file. `names` are the names of the earlier entries, in lower case.
+/// Checks an entry of a ZIP file. `names` are the paths of the earlier entries, in lower case.
 fn check_entry(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Observation>) {
     let name = entry.name;
     let mut add = |rule: &'static str, observed: String| found.push((rule, observed));
@@ -47,7 +47,10 @@ fn check_entry(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Obser
     if let Some(compression) = &entry.compression {
         add("package.compression", format!("{} is compressed by {compression}", shown(name)));
     }
-    if !names.insert(name.to_lowercase()) {
+    // Tools unpack equal paths to the same file, no matter how they are written.
+    let path = name.replace('\\', "/").to_lowercase();
+    let parts: Vec<_> = path.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
+    if !names.insert(parts.join("/")) {
         add("package.names", shown(name).into_owned());
     }
 }
@@ -238,5 +241,22 @@ fn check_glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'
     });
     if let Some(minor) = minors.max().filter(|minor| *minor >= 29) {
         add("package.glibc", format!("binaries/{platform}/{name} needs glibc 2.{minor}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Entry, check_entry};
+    use std::collections::HashSet;
+
+    #[test]
+    fn paths_of_entries_differ() {
+        let (mut names, mut found) = (HashSet::new(), Vec::new());
+        let different = ["a/", "a/b", "a.b", "ab", "b/a"];
+        for name in different.into_iter().chain(["a/b", "./ab", "b//a", "A.b", "b/./a"]) {
+            check_entry(&Entry { name, is_inside: true, compression: None }, &mut names, &mut found);
+        }
+        let repeated: Vec<_> = found.iter().map(|(rule, name)| (*rule, name.as_str())).collect();
+        assert_eq!(repeated, ["a/b", "./ab", "b//a", "A.b", "b/./a"].map(|name| ("package.names", name)));
     }
 }

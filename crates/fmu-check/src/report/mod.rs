@@ -9,6 +9,7 @@ use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Proof, Severity};
 use crate::options::{FailOn, Options};
 use crate::rules::TOPICS;
+use anyhow::Context as _;
 use fmi_abi::{one_line, shown, shown_to};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -246,11 +247,21 @@ impl Report {
     /// # Errors
     /// Fails if a file cannot be written.
     pub fn write(&self, directory: &Path) -> anyhow::Result<()> {
-        std::fs::create_dir_all(directory)?;
-        std::fs::write(directory.join("report.json"), self.json()?)?;
-        std::fs::write(directory.join("junit.xml"), self.junit())?;
-        std::fs::write(directory.join("report.sarif"), serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
-        std::fs::write(directory.join("report.html"), page::page(self))?;
+        std::fs::create_dir_all(directory)
+            .with_context(|| format!("{}: cannot be created", shown(&directory.to_string_lossy())))?;
+        // Atomically, so that a full disk does not leave a part of a report.
+        let write = |name: &str, content: Vec<u8>| {
+            let (path, new) = (directory.join(name), directory.join(format!(".{name}.new")));
+            let written = std::fs::write(&new, content).and_then(|()| std::fs::rename(&new, &path));
+            if written.is_err() {
+                let _ = std::fs::remove_file(&new);
+            }
+            written.with_context(|| format!("{}: cannot be written", shown(&path.to_string_lossy())))
+        };
+        write("report.json", self.json()?.into())?;
+        write("junit.xml", self.junit().into())?;
+        write("report.sarif", serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
+        write("report.html", page::page(self).into())?;
         Ok(())
     }
 }

@@ -19,7 +19,7 @@ pub fn interrupted_at() -> Option<Instant> {
 }
 
 /// Handles SIGINT, SIGTERM and SIGHUP: the first signal stops the check, which still writes its report; the same signal again
-/// ends the process.
+/// ends the process. Ignores SIGXFSZ, so that a file that exceeds a limit is an error.
 #[cfg(unix)]
 pub fn listen_for_interrupts() {
     extern "C" fn interrupt(_: libc::c_int) {
@@ -38,7 +38,20 @@ pub fn listen_for_interrupts() {
             }
         }
     }
+    // SAFETY: ignores a signal.
+    unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
 }
+
+/// Restores the signal that `listen_for_interrupts` ignores, in the processes of the FMU.
+#[cfg(unix)]
+pub fn restore_signals() {
+    // SAFETY: the default action ends the process.
+    unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_DFL) };
+}
+
+/// Does nothing: Windows does not have this signal.
+#[cfg(not(unix))]
+pub fn restore_signals() {}
 
 /// Does nothing: on Windows, an interrupt ends the process.
 #[cfg(not(unix))]
@@ -170,8 +183,30 @@ mod linux {
         orphans
     }
 
-    /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if the process sends a
-    /// signal to a process of the checker or to all processes.
+    /// System calls whose first argument is a process or a process group to which they send a signal, whose limits or scheduling
+    /// they change, or whose memory they access.
+    const BY_FIRST: [libc::c_long; 15] = [
+        libc::SYS_kill,
+        libc::SYS_tkill,
+        libc::SYS_tgkill,
+        libc::SYS_rt_sigqueueinfo,
+        libc::SYS_rt_tgsigqueueinfo,
+        libc::SYS_pidfd_open,
+        libc::SYS_prlimit64,
+        libc::SYS_sched_setaffinity,
+        libc::SYS_sched_setattr,
+        libc::SYS_sched_setparam,
+        libc::SYS_sched_setscheduler,
+        libc::SYS_process_vm_readv,
+        libc::SYS_process_vm_writev,
+        libc::SYS_migrate_pages,
+        libc::SYS_move_pages,
+    ];
+    /// System calls of this kind whose second argument is the process.
+    const BY_SECOND: [libc::c_long; 3] = [libc::SYS_ptrace, libc::SYS_setpriority, libc::SYS_ioprio_set];
+
+    /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if it sends a signal to
+    /// a process of the checker or to all processes, or changes such a process.
     pub fn isolate(checker: libc::pid_t) {
         // SAFETY: starts a session; the other calls only return numbers.
         let (server, group, caller) = unsafe {
@@ -179,25 +214,29 @@ mod linux {
             let server = libc::getppid();
             (server, libc::getpgid(checker), parent_of(checker))
         };
-        let mut targets = vec![-1, server, -server, checker, -checker, -group, caller];
+        let mut targets = vec![-1, server, -server, checker, -checker, group, -group, caller];
         targets.retain(|target| *target != 0);
         let step = |code: u32, jt, jf, k: i32| libc::sock_filter { code: code as u16, jt, jf, k: k as u32 };
         let load = |offset| step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
         let equals = |number: i32, jt, jf| step(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt, jf, number);
         let end = |action: u32| step(libc::BPF_RET | libc::BPF_K, 0, 0, action as i32);
         let count = targets.len() as u8;
-        // seccomp_data has the number of the system call at offset 0 and the first argument at offset 16.
-        let mut program = vec![
-            load(0),
-            equals(libc::SYS_kill as i32, 2, 0),
-            equals(libc::SYS_tgkill as i32, 1, 0),
-            equals(libc::SYS_tkill as i32, 0, count + 1),
-            load(16),
-        ];
-        for (index, target) in (0..count).zip(&targets) {
-            program.push(equals(*target, count - index, 0));
+        // seccomp_data has the number of the system call at offset 0, the first argument at offset 16, the second one at 24.
+        let mut program = vec![];
+        for (calls, argument) in [(&BY_FIRST[..], 16), (&BY_SECOND[..], 24)] {
+            program.push(load(0));
+            for (call, rest) in calls.iter().zip((0..calls.len() as u8).rev()) {
+                // The last comparison skips the argument, the targets and the end.
+                let otherwise = if rest == 0 { count + 3 } else { 0 };
+                program.push(equals(*call as i32, rest, otherwise));
+            }
+            program.push(load(argument));
+            for (target, rest) in targets.iter().zip((0..count).rev()) {
+                program.push(equals(*target, rest + 1, 0));
+            }
+            program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
         }
-        program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
+        program.push(end(libc::SECCOMP_RET_ALLOW));
         let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
         // SAFETY: the filter is for this process and its descendants. If the kernel does not support filters, all system calls
         // are allowed.

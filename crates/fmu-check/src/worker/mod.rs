@@ -34,6 +34,7 @@ use work::{end, work};
 /// program that offers checks must call this function first in `main`, because a check starts the same program again as a worker.
 pub fn run_worker_if_requested() {
     let Some(job) = std::env::var_os(VARIABLE) else { return };
+    contain::restore_signals();
     #[cfg(target_os = "linux")]
     if job.is_empty() {
         end(server::serve());
@@ -46,7 +47,19 @@ fn work_from_files(job: &Path) -> Result<(), String> {
     let message = |error: std::io::Error| error.to_string();
     let read = std::fs::read(job).map_err(message)?;
     let outcomes = File::create(job.with_file_name("outcomes")).map_err(message)?;
+    use_for_temporary_files(&job.with_file_name("temporary")).map_err(message)?;
     work(serde_json::from_slice(&read).map_err(|error| error.to_string())?, outcomes);
+    Ok(())
+}
+
+/// Creates a directory, and makes this process and its children use it for temporary files, so that the files that an FMU leaves
+/// there are removed with the directory.
+fn use_for_temporary_files(directory: &Path) -> std::io::Result<()> {
+    std::fs::create_dir(directory)?;
+    for name in ["TMPDIR", "TMP", "TEMP"] {
+        // SAFETY: this process has one thread.
+        unsafe { std::env::set_var(name, directory) };
+    }
     Ok(())
 }
 

@@ -4,6 +4,7 @@
 use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
 use super::job::{Ended, SCRATCH};
 use super::memory::calls_in_progress;
+use super::use_for_temporary_files;
 use super::work::{end, work};
 use std::fs::File;
 use std::io::{Read as _, Seek as _, Write as _};
@@ -31,6 +32,9 @@ pub fn serve() -> Result<(), String> {
 }
 
 fn jobs() -> std::io::Result<()> {
+    // Next to the working directory, which `pass_on` also empties.
+    let temporary = std::env::current_dir()?.with_extension("temporary");
+    use_for_temporary_files(&temporary)?;
     let mut files = [tempfile::tempfile()?, tempfile::tempfile()?];
     // SAFETY: only returns a number.
     let checker = unsafe { libc::getppid() };
@@ -58,7 +62,7 @@ fn jobs() -> std::io::Result<()> {
                 }
                 let inside = calls_in_progress().load(Ordering::Relaxed) > 0;
                 let ended = ended.map(Ended::from).unwrap_or_default();
-                pass_on(Ended { orphans, flood, inside, ..ended }, &mut files)?;
+                pass_on(Ended { orphans, flood, inside, ..ended }, &mut files, &temporary)?;
             }
         }
     }
@@ -108,9 +112,9 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
     }
 }
 
-/// Writes the results of a process to the standard output, as a line of JSON, and clears its files and the working directory for
-/// the next process.
-fn pass_on(mut ended: Ended, files: &mut [File; 2]) -> std::io::Result<()> {
+/// Writes the results of a process to the standard output, as a line of JSON, and clears its files, the working directory and the
+/// directory of temporary files for the next process.
+fn pass_on(mut ended: Ended, files: &mut [File; 2], temporary: &Path) -> std::io::Result<()> {
     let results = [(&mut ended.output, MOST_OUTPUT), (&mut ended.outcomes, u64::MAX)];
     for (file, (text, max_bytes)) in files.iter_mut().zip(results) {
         let mut bytes = Vec::new();
@@ -123,7 +127,7 @@ fn pass_on(mut ended: Ended, files: &mut [File; 2]) -> std::io::Result<()> {
     let mut output = std::io::stdout().lock();
     serde_json::to_writer(&mut output, &ended)?;
     output.write_all(b"\n")?;
-    for entry in std::fs::read_dir(".")?.flatten() {
+    for entry in std::fs::read_dir(".")?.chain(std::fs::read_dir(temporary)?).flatten() {
         let path = entry.path();
         let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
     }

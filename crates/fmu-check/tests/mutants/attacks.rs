@@ -1,12 +1,12 @@
-//! FMUs that start processes or send signals, and checks that are interrupted: no process and no file may remain.
+//! FMUs that start processes, send signals or change other processes, and checks that are interrupted: no process and no file may remain.
 
 use super::wagon::{UNLIMITED, check, fmu, library};
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Faults that start processes or send signals to other processes: FMI version, fault and name of the finding.
-pub const ATTACKS: [(u32, &str, &str); 8] = [
+/// Faults that start processes, or send signals to other processes or change them: FMI version, fault and name of the finding.
+pub const ATTACKS: [(u32, &str, &str); 12] = [
     (2, "forks", "resources.processes"),
     (3, "daemon_left", "resources.processes"),
     (2, "forks_without_end", "resources.processes"),
@@ -15,6 +15,10 @@ pub const ATTACKS: [(u32, &str, &str); 8] = [
     (3, "kills_parent", "life_cycle.crash"),
     (2, "kills_all", "life_cycle.crash"),
     (3, "stops_parent", "life_cycle.crash"),
+    (2, "limits_parent", "life_cycle.crash"),
+    (3, "slows_parent", "life_cycle.crash"),
+    (2, "moves_parent", "life_cycle.crash"),
+    (3, "traces_parent", "life_cycle.crash"),
 ];
 
 /// Returns the number of processes whose environment contains this mark.

@@ -7,12 +7,16 @@
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef __linux__
+#include <sys/ptrace.h>
+#endif
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -133,6 +137,18 @@ static void attack(void) {
     /* Signal 0 only tests the permission, so no process is harmed if the checker does not prevent the call. */
     if (IS(kills_all)) kill(-1, 0);
     if (IS(stops_parent)) kill(getppid(), SIGSTOP);
+#ifdef __linux__
+    if (IS(limits_parent)) {
+        char name[4096];
+        snprintf(name, sizeof name, "%s/left", getenv("TMPDIR"));
+        FILE *file = fopen(name, "w");
+        if (file) fclose(file);
+        prlimit(getppid(), RLIMIT_NOFILE, &(struct rlimit){1, 1}, NULL);
+    }
+    if (IS(slows_parent)) setpriority(PRIO_PROCESS, getppid(), 19);
+    if (IS(moves_parent)) { cpu_set_t first; CPU_ZERO(&first); CPU_SET(0, &first); sched_setaffinity(getppid(), sizeof first, &first); }
+    if (IS(traces_parent)) ptrace(PTRACE_ATTACH, getppid(), NULL, NULL);
+#endif
     if (IS(make_hangs)) for (;;) pause();
 }
 

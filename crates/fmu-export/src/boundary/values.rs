@@ -165,6 +165,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
     values: &[T],
     bases: &[BaseType],
 ) -> Outcome {
+    instance.check_types(vr, bases)?;
     let known = [false, true].map(T::from);
     if let Some(index) = values.iter().position(|value| !known.contains(value)) {
         return instance.reject_value(vr, bases, index, |name| {

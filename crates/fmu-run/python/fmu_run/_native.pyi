@@ -1,11 +1,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Array = NDArray[np.float64]
+_V = TypeVar("_V")
 _Names = str | Sequence[str]
 _Pairs = list[tuple[str, str]]
 _Text = str | None
@@ -13,6 +14,9 @@ _Number = float | None
 
 class FmuError(Exception):
     """An FMU cannot be loaded or run, is closed, or has rejected a call."""
+
+class Variables:
+    def dict(self, make: Callable[..., _V]) -> dict[str, _V]: ...
 
 class Loaded:
     def __init__(self, path: str | PathLike[str], execution_tool: bool) -> None: ...
@@ -27,7 +31,7 @@ class Loaded:
     def display_unit(self, name: str, unit: str) -> tuple[float, float]: ...
     def about(self) -> tuple[str, str, str, _Pairs, list[str], list[tuple[str, bool]], dict[str, _Pairs]]: ...
     def about_system(self) -> tuple[str, list[list[tuple[str, str]]], float | None]: ...
-    def variables(self) -> list[tuple[str, str, str, _Text, _Text, _Text, str, _Number, _Number, _Text]]: ...
+    def variables(self) -> Variables: ...
     def run(
         self,
         time: ArrayLike,

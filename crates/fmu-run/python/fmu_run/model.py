@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -22,7 +23,7 @@ _Array = NDArray[np.float64]
 _CONDITION = re.compile(r"used (?:in (Co-Simulation|Model Exchange) )?only if (\w+) is true")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A variable of the model description.
 
@@ -65,9 +66,7 @@ class Model:
 
     def __init__(self, loaded: Loaded):
         self._loaded = loaded
-        #: dict[str, Variable]: the variables by name, in the order of the model description. As in FMI 2.0, each element of an array of
-        #: FMI 3.0 is a variable: T[3]. Clocks are omitted.
-        self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
+        self._variables = loaded.variables()
         #: Inputs about which `run` has warned.
         self._warned = set[str]()
 
@@ -78,6 +77,12 @@ class Model:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """The variables by name, in the order of the model description. As in FMI 2.0, each element of an array of FMI 3.0 is a
+        variable: T[3]. Clocks are omitted. The first access takes about 2 s for a million elements."""
+        return self._variables.dict(Variable)
 
     def close(self) -> None:
         """Unload the FMUs and remove the unpacked files as soon as all instances are freed. Further calls have no effect."""

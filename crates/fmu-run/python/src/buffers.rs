@@ -1,4 +1,5 @@
-//! Reads and writes arrays of float64 in Python objects, without copies where possible.
+//! Reads and writes arrays of float64 in Python objects. While FMUs run without the GIL, other threads may write to arrays of the
+//! caller, so these arrays are copied before and after.
 
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
@@ -6,11 +7,11 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyTuple};
 
-/// Numbers of an argument: a single number, a copied row, or an array that is read in place.
+/// Numbers of an argument: a single number, a row, or an array with its shape.
 pub enum Numbers {
     One(f64),
     Row(Vec<f64>),
-    Array(PyBuffer<f64>),
+    Array(Vec<f64>, Vec<usize>),
 }
 
 impl Numbers {
@@ -20,33 +21,30 @@ impl Numbers {
             return Ok(Self::One(number.value()));
         }
         check_masks(name, values)?;
-        if let Ok(buffer) = PyBuffer::get(values)
-            && buffer.is_c_contiguous()
-        {
-            return Ok(Self::Array(buffer));
+        let copy =
+            |buffer: &PyBuffer<f64>| Ok(Self::Array(buffer.to_vec(values.py())?, buffer.shape().to_vec()));
+        if let Ok(buffer) = PyBuffer::get(values) {
+            return copy(&buffer);
         }
         let array = array_of(name, values)?;
         if array.getattr("ndim")?.extract::<usize>()? == 0 {
             return Ok(Self::One(array.extract()?));
         }
-        static CONTIGUOUS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-        let contiguous = CONTIGUOUS.import(values.py(), "numpy", "ascontiguousarray")?;
-        Ok(Self::Array(PyBuffer::get(&contiguous.call1((array,))?)?))
+        copy(&PyBuffer::get(&array)?)
     }
 
-    /// Returns the shape of an array; empty for a single number and a copied row.
+    /// Returns the shape of an array; empty for a single number and a row.
     pub fn shape(&self) -> &[usize] {
         match self {
             Self::One(_) | Self::Row(_) => &[],
-            Self::Array(buffer) => buffer.shape(),
+            Self::Array(_, shape) => shape,
         }
     }
 
     pub fn values(&self) -> &[f64] {
         match self {
             Self::One(value) => std::slice::from_ref(value),
-            Self::Row(values) => values,
-            Self::Array(buffer) => read(buffer),
+            Self::Row(values) | Self::Array(values, _) => values,
         }
     }
 }
@@ -89,20 +87,8 @@ pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'
     array.call_method1("astype", ("float64",))
 }
 
-/// Returns the numbers of an array. As with NumPy's own functions, no other thread may write to the array while the numbers are
-/// used.
-fn read(buffer: &PyBuffer<f64>) -> &[f64] {
-    match buffer.item_count() {
-        0 => &[],
-        // SAFETY: PyO3 has checked type, alignment and size. The memory is contiguous (`Numbers::of`) and
-        // stays valid while the buffer exists.
-        #[allow(unsafe_code)]
-        count => unsafe { std::slice::from_raw_parts(buffer.buf_ptr().cast(), count) },
-    }
-}
-
-/// An array to which results are written.
-pub struct Output(PyBuffer<f64>);
+/// An array to which results are written: a new one, or one of the caller with a copy of its values.
+pub struct Output(PyBuffer<f64>, Option<Vec<f64>>);
 
 impl Output {
     /// Creates a NumPy array of this shape, or checks the array that the caller passes.
@@ -111,6 +97,7 @@ impl Output {
         given: Option<Bound<'py, PyAny>>,
         shape: &[usize],
     ) -> PyResult<(Bound<'py, PyAny>, Self)> {
+        let is_given = given.is_some();
         let array = match given {
             Some(array) => array,
             // Uses `zeros` of NumPy, because it asks the kernel for large pages.
@@ -129,24 +116,24 @@ impl Output {
         if buffer.readonly() || !buffer.is_c_contiguous() || buffer.shape() != shape {
             return Err(wrong());
         }
-        Ok((array, Self(buffer)))
-    }
-
-    /// Fails if the array shares memory with numbers that are read at the same time.
-    pub fn check_disjoint(&self, read: &Numbers) -> PyResult<()> {
-        let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
-        let is_disjoint = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
-        let message = "out shares memory with the values that are set";
-        if is_disjoint { Ok(()) } else { Err(PyValueError::new_err(message)) }
+        let copy = is_given.then(|| buffer.to_vec(py)).transpose()?;
+        Ok((array, Self(buffer, copy)))
     }
 
     pub fn values(&mut self) -> &mut [f64] {
-        match self.0.item_count() {
-            0 => &mut [],
-            // SAFETY: the conditions of `read` hold, and `Output::of` has checked that the array is writable.
+        match (&mut self.1, self.0.item_count()) {
+            (Some(copy), _) => copy,
+            (None, 0) => &mut [],
+            // SAFETY: PyO3 has checked type, alignment and size, and `of` that the memory is writable and contiguous. No other
+            // code has the new array before the call returns it.
             #[allow(unsafe_code)]
-            count => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
+            (None, count) => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
         }
+    }
+
+    /// Writes the values to the array of the caller, if there is one.
+    pub fn finish(self, py: Python) -> PyResult<()> {
+        self.1.map_or(Ok(()), |copy| self.0.copy_from_slice(py, &copy))
     }
 }
 

@@ -281,10 +281,10 @@ impl Instances {
         let (set, get) = (self.named("set", set)?, self.named("get", get)?);
         let values = self.fitting(&set.row, "values", values)?;
         let (array, mut output) = Output::of(py, out, &self.shape(&get.row))?;
-        output.check_disjoint(&values)?;
         self.attempt(py, |all| {
             all.advance((&set.selection, values.values()), size, (&get.selection, output.values()))
         })?;
+        output.finish(py)?;
         Ok(array)
     }
 
@@ -366,11 +366,11 @@ impl Instances {
         let (unknowns, knowns) = (self.named("unknowns", unknowns)?, self.named("knowns", knowns)?);
         let seed = self.fitting(&knowns.row, "seed", seed)?;
         let (array, mut output) = Output::of(py, out, &self.shape(&unknowns.row))?;
-        output.check_disjoint(&seed)?;
         self.attempt(py, |all| {
             let seed = (&knowns.selection, seed.values());
             all.directional_derivative(&unknowns.selection, seed, output.values())
         })?;
+        output.finish(py)?;
         Ok(array)
     }
 
@@ -670,6 +670,7 @@ impl Instances {
     ) -> PyResult<Bound<'py, PyAny>> {
         let (array, mut output) = Output::of(py, out, &self.shape(row))?;
         self.attempt(py, |all| body(all, output.values()))?;
+        output.finish(py)?;
         Ok(array)
     }
 

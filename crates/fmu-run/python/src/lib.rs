@@ -15,7 +15,7 @@ use log::Log;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyString, PyTuple};
 use signals::Signals;
 use start::Start;
 use std::collections::BTreeMap;
@@ -47,9 +47,6 @@ impl Model {
     }
 }
 
-/// Name, type, causality, variability, start value, unit, description, minimum, maximum and display unit of a variable.
-type Described = (String, String, String, Text, Text, Text, String, Option<f64>, Option<f64>, Text);
-type Text = Option<String>;
 /// FMI version, model name, token, pairs of a state and its derivative, names of floating-point outputs, whether each interface
 /// type has directional derivatives, and attributes of units.
 type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, BTreeMap<String, Pairs>);
@@ -75,6 +72,53 @@ type Results<'py> = (
     Vec<(usize, f64, Vec<f64>, Vec<f64>)>,
     Option<PyErr>,
 );
+
+/// Attributes and start value of a variable, and both as Python objects.
+type Shared<'a, 'py> = (&'a fmu_run::Attributes, Option<&'a Arc<str>>, [Bound<'py, PyAny>; 9]);
+
+/// The variables of an FMU or system.
+#[pyclass(frozen, module = "fmu_run._native")]
+struct Variables(fmu_run::Variables);
+
+#[pymethods]
+impl Variables {
+    /// Calls `make` with name, type, causality, variability, start value, unit, description, minimum, maximum and display unit of
+    /// each variable, and returns a dict of the results by name. Because the elements of an array may be a million, they share all
+    /// values except the name.
+    fn dict<'py>(&self, py: Python<'py>, make: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let mut last: Option<Shared<'_, 'py>> = None;
+        for (name, variable) in self.0.iter() {
+            let (of, start): (&fmu_run::Attributes, _) = (variable, variable.start.as_ref());
+            let same_start = |other: &Option<&Arc<str>>| match (start, other) {
+                (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+                (one, other) => one.is_none() && other.is_none(),
+            };
+            let shared = match last.take().filter(|last| std::ptr::eq(last.0, of) && same_start(&last.1)) {
+                Some((.., shared)) => shared,
+                None => {
+                    let any = |text: Option<&str>| text.into_pyobject(py);
+                    [
+                        any(Some(&of.base.to_string()))?,
+                        any(Some(&of.causality))?,
+                        any(of.variability.as_deref())?,
+                        any(start.map(|start| &**start))?,
+                        any(of.unit.as_deref())?,
+                        any(Some(&of.description))?,
+                        of.min.into_pyobject(py)?,
+                        of.max.into_pyobject(py)?,
+                        any(of.display_unit.as_deref())?,
+                    ]
+                }
+            };
+            let [a, b, c, d, e, f, g, h, i] = &shared;
+            let name = PyString::new(py, &name);
+            dict.set_item(&name, make.call1((&name, a, b, c, d, e, f, g, h, i))?)?;
+            last = Some((of, start, shared));
+        }
+        Ok(dict)
+    }
+}
 
 fn python(error: Error) -> PyErr {
     // `to_string` returns one line without control characters.
@@ -193,16 +237,9 @@ impl Loaded {
         Ok((system.name().to_owned(), stages.collect(), system.stop_time()))
     }
 
-    fn variables(&self) -> PyResult<Vec<Described>> {
-        let describe = |(name, variable): (String, &fmu_run::Variable)| {
-            let fmu_run::Variable { start, .. } = variable.clone();
-            let fmu_run::Attributes { base, causality, variability, unit, .. } = (**variable).clone();
-            let fmu_run::Attributes { description, min, max, display_unit, .. } = (**variable).clone();
-            let [start, unit, display_unit] =
-                [start, unit, display_unit].map(|text| text.map(|text| text.to_string()));
-            (name, base.to_string(), causality, variability, start, unit, description, min, max, display_unit)
-        };
-        Ok(self.model()?.system().variables().map(describe).collect())
+    /// Returns the variables, which stay available after `close`.
+    fn variables(&self) -> PyResult<Variables> {
+        Ok(Variables(self.model()?.system().variables()))
     }
 
     /// Performs the runs, and meanwhile calls `progress(done, runs)`. After Ctrl-C, all runs stop after their current step.
@@ -416,5 +453,5 @@ mod _native {
     #[pymodule_export]
     use super::instances::{Instances, States};
     #[pymodule_export]
-    use super::{FmuError, Loaded, numbers};
+    use super::{FmuError, Loaded, Variables, numbers};
 }

@@ -73,6 +73,23 @@ pub(crate) struct Component {
     pub fmu: Arc<Loaded>,
 }
 
+/// The variables of a [`System`]. It does not keep the FMUs loaded.
+#[derive(Clone, Debug)]
+pub struct Variables {
+    own: Vec<(String, Variable)>,
+    components: Vec<(String, Arc<Description>)>,
+}
+
+impl Variables {
+    /// Returns the names and the variables: inputs and outputs of the system first, then variables of the components.
+    pub fn iter(&self) -> impl Iterator<Item = (String, &Variable)> {
+        let of_components = self.components.iter().flat_map(|(component, description)| {
+            description.variables.iter().map(|of| (joined(component, &of.name), of))
+        });
+        self.own.iter().map(|(name, of)| (name.clone(), of)).chain(of_components)
+    }
+}
+
 /// Specification of a system: components and connections.
 #[derive(Clone, Debug, Default)]
 pub struct Composition<'a> {
@@ -125,13 +142,12 @@ impl System {
         &self.0.name
     }
 
-    /// Returns all variables with their names in the system: inputs and outputs of the system first, then
-    /// variables of the components.
-    pub fn variables(&self) -> impl Iterator<Item = (String, &Variable)> {
-        let own = self.0.connectors.iter().map(|(name, connector)| (name.clone(), &connector.variable));
-        own.chain(self.components().iter().flat_map(|component| {
-            component.fmu.description.variables.iter().map(|of| (joined(&component.name, &of.name), of))
-        }))
+    /// Returns all variables with their names in the system.
+    pub fn variables(&self) -> Variables {
+        let own =
+            self.0.connectors.iter().map(|(name, connector)| (name.clone(), connector.variable.clone()));
+        let of = |component: &Component| (component.name.clone(), Arc::clone(&component.fmu.description));
+        Variables { own: own.collect(), components: self.components().iter().map(of).collect() }
     }
 
     /// Returns the connections, from outputs to inputs, in the stages in which values are passed at a communication point.
@@ -182,7 +198,7 @@ impl System {
             return None;
         }
         let all = self.0.arrays.get_or_init(|| {
-            let names: Vec<_> = self.variables().map(|(name, _)| name).collect();
+            let names: Vec<_> = self.variables().iter().map(|(name, _)| name).collect();
             elements::arrays(names.iter().map(String::as_str))
         });
         all.get(name)

@@ -273,8 +273,9 @@ fn connections_have_directions_units_and_transformations() {
         let runs = system.run(&batch, &Watch::default()).unwrap();
         assert_eq!(runs.errors, []);
         assert_eq!(runs.trajectories, [105.0, 106.0, -0.5, -0.5, 3.0, 3.5, 1.0, 2.0]);
+        let variables = system.variables();
         let variables: Vec<_> =
-            system.variables().filter(|(name, _)| name == "halved" || name == "out").collect();
+            variables.iter().filter(|(name, _)| name == "halved" || name == "out").collect();
         let unit = |index: usize| variables[index].1.unit.as_deref();
         assert_eq!([unit(0), unit(1)], [Some("half"), Some("rad")]);
         for (name, why) in [

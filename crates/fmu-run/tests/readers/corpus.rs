@@ -262,6 +262,10 @@ pub fn archives() -> Files {
         ("an FMU", packed([("modelDescription.xml".to_owned(), descriptions().remove(0).1)])),
         ("bomb", bomb),
         ("entries", packed((0..2000).map(|number| (format!("{number}/"), Vec::new())))),
+        (
+            "directories",
+            packed((0..30).map(|number| (format!("{number}/{}x", "d/".repeat(1900)), Vec::new()))),
+        ),
         ("declared size", liar),
         ("declared entries", counted),
         ("above", one("../outside")),

@@ -3,6 +3,7 @@
 use super::parameters::Target;
 use super::read::{Read, child};
 use super::source::Base;
+use crate::description::Variable;
 use crate::error::Error;
 use crate::files::{Files, Kind, STRUCTURE};
 use crate::fmu::Loaded;
@@ -55,6 +56,9 @@ impl System {
                     Arc::clone(loaded.entry(source).or_insert_with(|| Arc::new(opened)))
                 }
             };
+            // Each variable gets a name that begins with the name of its component.
+            let length = |of: &Variable| name.len() + of.name.len() + size_of::<String>();
+            fmu.description.variables.iter().try_for_each(|of| read.take(length(of))).map_err(fail)?;
             components.push(Component { name: name.clone(), fmu });
         }
         let mut definition = Definition::of(root.attribute("name").unwrap_or("system"), components);
