@@ -21,6 +21,9 @@ impl<M: Exported> Instance<M> {
         seed: &[f64],
         sums: &mut [f64],
     ) -> Outcome {
+        if !M::PARTIALS {
+            return self.reject_derivatives(ADJOINT);
+        }
         self.calculated();
         let initial = self.mode() == Mode::Initialization;
         // The total is finite only if all sums are, and a sum is finite only if all its seeds are, so one check is
@@ -78,7 +81,7 @@ impl<M: Exported> Instance<M> {
 
     #[cold]
     #[inline(never)]
-    pub fn reject_derivatives(&self, adjoint: bool) -> Outcome {
+    fn reject_derivatives(&self, adjoint: bool) -> Outcome {
         let plural = if self.standard() == Standard::Fmi2 { "" } else { "s" };
         let (kind, capability) =
             if adjoint { ("adjoint", "Adjoint") } else { ("directional", "Directional") };

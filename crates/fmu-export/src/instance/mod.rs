@@ -395,6 +395,8 @@ impl<M: Exported> Instance<M> {
     }
 
     /// Fails at the first reference without a variable.
+    #[cold]
+    #[inline(never)]
     pub fn check_references<R: Reference>(&self, vr: &[R]) -> Outcome {
         match vr.iter().find(|vr| self.find(vr.index()).is_none()) {
             Some(unknown) => self.reject_index(unknown.index()),
