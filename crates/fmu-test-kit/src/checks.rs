@@ -2,16 +2,18 @@
 //! each check for a model.
 
 use crate::serialized::{MODE, sealed, time};
-use crate::{Either, Random};
+use crate::{Either, Random, Version};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::{BaseType, Causality, Exported, Interface, Status, Variable};
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 
 /// Defines one test per check for a model; each test runs in both FMI versions.
 #[macro_export]
 macro_rules! every_check {
-    ($model:ty) => { $crate::every_check! { @each $model: random_contents_break_nothing steps_of_any_size } };
+    ($model:ty) => { $crate::every_check! {
+        @each $model: random_contents_break_nothing steps_of_any_size steps_of_size_zero
+    } };
     (@each $model:ty: $($check:ident)*) => {
         $(#[test] fn $check() {
             $crate::checks::$check::<$crate::Importer, $model>();
@@ -155,5 +157,30 @@ pub fn steps_of_any_size<F: Either, M: Exported>() {
         let (status, _) =
             received.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes over 10 seconds"));
         assert!(matches!(status, Status::Ok | Status::Error), "{step_size:e}: {status:?}");
+    }
+}
+
+/// Checks that a step of size 0 changes nothing and is logged once, before the first step and later, because some
+/// importers begin with one.
+pub fn steps_of_size_zero<F: Either, M: Exported>() {
+    let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
+    fmu.ok(match fmu.version() {
+        Version::Fmi2(fmu) => fmu.fmi2SetDebugLogging(1, 0, null()),
+        Version::Fmi3(fmu) => fmu.fmi3SetDebugLogging(1, 0, null()),
+    });
+    let inputs = inputs::<M>();
+    let mut time = 0.0;
+    for value in [0.5, 0.6, 0.8] {
+        fmu.set(&inputs, &vec![value; inputs.len()]);
+        let before = fmu.bytes();
+        fmu.take_log();
+        for zero in [0.0, -0.0] {
+            fmu.step(time, zero);
+            let log: Vec<_> = fmu.take_log().into_iter().map(|message| message.message).collect();
+            assert!(log.len() == 1 && log[0].contains("size 0"), "{log:?}");
+        }
+        assert_eq!(fmu.bytes(), before, "at {time}");
+        fmu.step(time, 0.01);
+        time += 0.01;
     }
 }

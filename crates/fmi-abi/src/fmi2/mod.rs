@@ -20,6 +20,7 @@ use types::*;
 /// * fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is then 0;
 /// * fmi2SetInteger, fmi2SetBoolean and fmi2SetString in Continuous-Time Mode, if each input already has the value that
 ///   is set (FMPy);
+/// * fmi2DoStep with a step of size 0, which changes nothing (syssimx);
 /// * fmi2SetTime in Initialization Mode and Event Mode, fmi2SetContinuousStates in Event Mode (OpenModelica makes
 ///   these calls in every run).
 #[doc(hidden)]

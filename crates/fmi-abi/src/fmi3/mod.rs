@@ -24,6 +24,7 @@ use types::*;
 ///
 /// Tolerated calls, for interface types that have the function:
 /// * fmi3SetTime in Initialization Mode and Event Mode, fmi3SetContinuousStates in Event Mode, as in FMI 2.0;
+/// * fmi3DoStep with a step of size 0, as in FMI 2.0;
 /// * the functions that return the number of states, the number of event indicators and the nominal values, in every
 ///   state, because the numbers never change and nominal values exist from the start;
 /// * functions that set discrete inputs in Continuous-Time Mode, if each input already has the value that is set

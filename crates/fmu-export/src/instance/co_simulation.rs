@@ -138,7 +138,7 @@ impl<M: Exported> Instance<M> {
     pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
         // These conditions are also false for NaN, so it is rejected.
-        if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {
+        if !(point > f64::NEG_INFINITY && (end > point || step_size == 0.0) && end < f64::INFINITY) {
             return reject_step(point, step_size);
         }
         let rounding = rounding(point, step_size);
@@ -166,6 +166,9 @@ impl<M: Exported> Instance<M> {
                 return Ok(Stepped::Terminate(point));
             }
         }
+        if step_size == 0.0 {
+            return Ok(self.stay(point));
+        }
         if (Self::ENDS_EARLY || !Self::IS_ATOMIC)
             && let Some(before) = &mut self.rollback
         {
@@ -182,6 +185,15 @@ impl<M: Exported> Instance<M> {
             return Ok(stepped);
         }
         self.through_events(stepped, point, end)
+    }
+
+    /// Accepts a step of size 0, which some importers make before the first step, although the size must be above 0. The
+    /// model is not called, so it does not notice the step.
+    #[cold]
+    fn stay(&mut self, point: f64) -> Stepped {
+        self.state.time = point;
+        self.logger.log(Status::Ok, format!("a step of size 0 at {point} changes nothing"));
+        Stepped::Done
     }
 
     #[inline]

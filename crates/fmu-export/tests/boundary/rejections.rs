@@ -123,8 +123,9 @@ fn steps() {
     fmu.ok(fmu.fmi2ExitInitializationMode());
     fmu.step(1.0, 0.25);
     for (point, step_size, word) in [
-        (1.25, 0.0, "step size"),
-        (1.25, -0.0, "step size"),
+        (1.0, 0.0, "1.25"),
+        (NAN, 0.0, "point"),
+        (INF, 0.0, "point"),
         (1.25, -0.25, "step size"),
         (1.25, NAN, "step size"),
         (1.25, INF, "step size"),
