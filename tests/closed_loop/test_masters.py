@@ -63,11 +63,11 @@ def test_the_motors_keep_their_limits(response, closed_loop):
 
 
 def test_systems_of_fmu_run_agree_with_all_masters(master, response, closed_loop):
-    """All masters use Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos has other rounding errors, and reads
-    the torques, which depend directly on inputs, after it has set the next inputs. So torques are not compared for Ecos."""
+    """All masters use Jacobi's method. FMPy and libcosim are bit-identical to fmu_run. Ecos and sofirpy have other rounding errors, and read
+    the torques, which depend directly on inputs, after they have set the next inputs. So torques are not compared for these two."""
     own = by_fmu_run(closed_loop, starts_late=master.name == "FMPy")
     for name, column in zip(masters.RECORDED, own.T):
-        if master.name != "Ecos":
+        if master.name not in ("Ecos", "sofirpy"):
             assert np.array_equal(response[name], column), name
         elif "tau" not in name:
             # An omega is a difference of angles divided by a step, so it loses three digits.

@@ -59,6 +59,12 @@ def test_the_numbers_of_the_readme() -> None:
     ran = {row[0].split("]")[0].removesuffix("'s runtime") for row in AT_A_GLANCE if {"✓", "(✓)"} & {*row}}
     others = ran - {"[fmu_run", "[Programs in C"}
     assert f"{len(others)} other tools have run it" in rows["Portable"], others
+    listed = re.search(
+        r"`make test` runs (.*) and the programs in C\.", text("docs/compatibility.md").replace("\n", " ")
+    )
+    assert listed and all(any(name.split()[0] in tool for tool in ran) for name in listed[1].split(", ")), ran
+    words = ("four", "five", "six", "seven", "eight", "nine", "ten")
+    assert f"{words[len(listed[1].split(', ')) - 5]} of them" in rows["Portable"]  # without fmu_run
 
 
 def test_the_numbers_of_the_readmes_of_crates() -> None:

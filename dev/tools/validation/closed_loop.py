@@ -1,4 +1,4 @@
-"""Runs the closed loop, prw_closed_loop.ssp or OspSystemStructure.xml, under FMPy, libcosim and Ecos, if they are installed.
+"""Runs the closed loop, prw_closed_loop.ssp or OspSystemStructure.xml, under FMPy, libcosim, Ecos and sofirpy, if they are installed.
 Compares the results, and calculates the error of the coupling for several communication steps. Writes closed_loop.csv,
 closed_loop.png, coupling.csv and coupling.png."""
 

@@ -1,8 +1,8 @@
-"""Third-party co-simulation masters that run the closed loop: FMPy's SSP support, libcosim, Ecos.
+"""Third-party co-simulation masters that run the closed loop: FMPy's SSP support, libcosim, Ecos, sofirpy.
 
-All three couple by Jacobi's method: during a step, every FMU gets the outputs that the others had at the beginning of
-the step. So with the same step size, their results must agree within rounding error, except for the torques of Ecos,
-which it reads later. Each master runs in a separate process, because libraries in C++ start loggers and thread pools,
+All couple by Jacobi's method: during a step, every FMU gets the outputs that the others had at the beginning of
+the step. So with the same step size, their results must agree within rounding error, except for the torques of Ecos
+and sofirpy, which read them later. Each master runs in a separate process, because libraries in C++ start loggers and thread pools,
 and may crash.
 """
 
@@ -13,7 +13,9 @@ import os
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -99,10 +101,41 @@ def ecos(system: System) -> np.ndarray:
     return rows
 
 
+def sofirpy(system: System) -> np.ndarray:
+    """sofirpy, connected by a table, because it does not read SSPs. Like Ecos, it records torques after it has set the next inputs."""
+    warnings.filterwarnings("ignore", "pkg_resources is deprecated")  # by a part of sofirpy that saves runs
+    from sofirpy import simulate
+
+    connections: dict[str, Any] = {component: [] for component in system.fmus}
+    values: dict[str, Any] = {component: {} for component in system.fmus}
+    recorded: dict[str, list[str]] = {component: [] for component in system.fmus}
+    for start, end in system.connections:
+        (source, output), (target, name) = start.split("."), end.split(".")
+        connections[target].append(
+            {"parameter_name": name, "connect_to_system": source, "connect_to_external_parameter": output}
+        )
+    for variable, value in {**system.start, **dict(system.inputs.values())}.items():
+        component, name = variable.split(".")
+        values[component][name] = value
+    for variable in RECORDED:
+        component, name = variable.split(".")
+        recorded[component].append(name)
+    rows = simulate(
+        stop_time=(system.steps + 0.5) * system.step,  # half a step more, in case that the last end is rounded up
+        step_size=system.step,
+        fmu_paths={component: system.osp / fmu for component, fmu in system.fmus.items()},
+        connections_config=connections,
+        start_values=values,
+        parameters_to_log=recorded,
+    )
+    return np.array(rows[list(RECORDED)])[1:]
+
+
 MASTERS = (
     Tool("FMPy", "fmpy", "CoSimulation", fmpy_ssp),
     Tool("libcosim", "libcosimpy", "CoSimulation", libcosim),
     Tool("Ecos", "ecospy", "CoSimulation", ecos),
+    Tool("sofirpy", "sofirpy", "CoSimulation", sofirpy),
 )
 
 
