@@ -21,7 +21,8 @@ pub struct Info {
     /// Default experiment, which an importer proposes to its user.
     pub default_experiment: DefaultExperiment,
     /// Whether outputs and derivatives are smooth functions of inputs, states and parameters: no branches, saturation,
-    /// dead zones or events. Integer, Boolean and Enumeration parameters may still select between equations.
+    /// dead zones or events. Integer, Boolean and Enumeration parameters may still select between equations. The
+    /// build rejects `smooth` for a model with event indicators, `EVENTS` or `STEP_COMPLETED`.
     ///
     /// An unknown with [`depends_on`](crate::Variable::depends_on) depends on the variables in this list. An unknown
     /// without `depends_on` is taken to depend on all knowns if `smooth` is false. If `smooth` is true, fmu-package

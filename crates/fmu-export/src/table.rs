@@ -715,8 +715,8 @@ macro_rules! variables {
     (@name) => { Name };
     (@name $names:ident) => { $names };
     (@refined [$($variable:tt)+]) => { $($variable)+ };
-    (@refined [$($variable:tt)+] . depends_on ($($known:ident),+ $(,)?) $($rest:tt)*) => {
-        $crate::variables!(@refined [$($variable)+ . depends_on(&[$($known),+])] $($rest)*)
+    (@refined [$($variable:tt)+] . depends_on ($($known:ident),* $(,)?) $($rest:tt)*) => {
+        $crate::variables!(@refined [$($variable)+ . depends_on(&[$($known),*])] $($rest)*)
     };
     (@refined [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
         $crate::variables!(@refined [$($variable)+ . $refinement $arguments] $($rest)*)

@@ -292,7 +292,7 @@ impl<M> Variable<M> {
 
     /// Lists all inputs, states, parameters and start values on which an output, a local variable or a calculated
     /// parameter depends. In the table, write `depends_on(u, x)` or `depends_on(&[u, x])`; if it depends on none, write
-    /// `depends_on(&[])`.
+    /// `depends_on()`.
     ///
     /// The list contains only direct dependencies (section 2.2.8 of FMI 2.0): the variables whose values change the
     /// result at the same instant, or in Initialization Mode. An output that reacts to an input only through a step or

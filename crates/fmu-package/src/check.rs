@@ -21,10 +21,18 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
         "{} offers neither Co-Simulation nor Model Exchange",
         table.info.name
     );
+    check_smooth(table)?;
     for variable in &table.variables {
         let name = &variable.name;
-        ensure!(is_text(name), "the variable name '{}' is empty or more than one line", name.escape_debug());
-        ensure!(is_line(&variable.description), "the description of {name} is more than one line");
+        ensure!(
+            is_text(name),
+            "the variable name '{}' is empty or has a line break or another control character",
+            name.escape_debug()
+        );
+        ensure!(
+            is_line(&variable.description),
+            "the description of {name} has a line break or another control character"
+        );
         ensure!(
             !table.arrays || is_structured(name),
             "the variable name '{}' is not a name of the structured naming convention, which a model with arrays needs: \
@@ -46,6 +54,26 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
     let starts = check_starts(table)?;
     check_model(model, &starts)?;
     Ok(starts)
+}
+
+/// Rejects `smooth` for a model with events, because its dependencies are searched near the start values only, where a branch that an
+/// event selects later has no effect.
+fn check_smooth(table: &Table) -> Result<()> {
+    let exchange = table.model_exchange.as_ref();
+    let stops = table.co_simulation.as_ref().is_some_and(|offer| offer.event_mode);
+    let found = match table.indicators() {
+        0 if exchange.is_some_and(|offer| offer.step_completed) => "STEP_COMPLETED",
+        0 if stops => "EVENTS",
+        0 => return Ok(()),
+        _ => "INDICATORS",
+    };
+    ensure!(
+        !table.info.smooth,
+        "{} has events ({found}), so its equations are not smooth, and dependencies that show only after an event would be missing; \
+         leave `smooth` out of INFO and name what each output and derivative follows from with `depends_on`",
+        table.info.name
+    );
+    Ok(())
 }
 
 fn is_line(text: &str) -> bool {
@@ -122,7 +150,7 @@ fn is_positive(value: f64) -> bool {
 fn check_info(info: &Info) -> Result<()> {
     ensure!(
         is_text(&info.name),
-        "the model's name '{}' is empty or more than one line",
+        "the model's name '{}' is empty or has a line break or another control character",
         info.name.escape_debug()
     );
     ensure!(
@@ -137,7 +165,7 @@ fn check_info(info: &Info) -> Result<()> {
         ("license", &info.license),
         ("copyright", &info.copyright),
     ] {
-        ensure!(is_line(text), "the {fact} of {} is more than one line", info.name);
+        ensure!(is_line(text), "the {fact} of {} has a line break or another control character", info.name);
     }
     for (name, value) in [("start time", info.start_time), ("stop time", info.stop_time)] {
         ensure!(value.is_finite(), "the {name} of the default experiment must be finite, it is {value}");
@@ -158,10 +186,14 @@ fn check_info(info: &Info) -> Result<()> {
 }
 
 fn check_type(variable_type: &Type) -> Result<()> {
-    ensure!(is_line(&variable_type.name), "its name is more than one line");
+    ensure!(is_line(&variable_type.name), "its name has a line break or another control character");
     match &variable_type.attributes {
         Attributes::Real { quantity, unit, min, max, nominal } => {
-            ensure!(is_line(quantity), "its quantity '{}' is more than one line", quantity.escape_debug());
+            ensure!(
+                is_line(quantity),
+                "its quantity '{}' has a line break or another control character",
+                quantity.escape_debug()
+            );
             for (name, limit) in [("min", min), ("max", max)] {
                 let limit = limit.map(|limit| rounded(variable_type.base, limit));
                 ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
@@ -185,12 +217,12 @@ fn check_type(variable_type: &Type) -> Result<()> {
             for item in items {
                 ensure!(
                     is_text(&item.name),
-                    "the item '{}' is empty or more than one line",
+                    "the item '{}' is empty or has a line break or another control character",
                     item.name.escape_debug()
                 );
                 ensure!(
                     is_line(&item.description),
-                    "the description of its item {} is more than one line",
+                    "the description of its item {} has a line break or another control character",
                     item.name
                 );
                 ensure!(names.insert(&item.name), "it has two items with the name {}", item.name);
@@ -201,7 +233,7 @@ fn check_type(variable_type: &Type) -> Result<()> {
         Attributes::Binary { mime_type, .. } => {
             ensure!(
                 is_text(mime_type),
-                "its MIME type '{}' is empty or more than one line",
+                "its MIME type '{}' is empty or has a line break or another control character",
                 mime_type.escape_debug()
             );
             Ok(())
@@ -225,7 +257,7 @@ fn check_unit(unit: &Unit) -> Result<()> {
     for (kind, name, factor, offset) in [own].into_iter().chain(display) {
         ensure!(
             is_text(name),
-            "the name '{}' of its {kind} is empty or more than one line",
+            "the name '{}' of its {kind} is empty or has a line break or another control character",
             name.escape_debug()
         );
         ensure!(

@@ -103,12 +103,20 @@ impl Terminal {
 
     fn check(&self, model: &LoadedModel, content: &[ContentFile]) -> Result<()> {
         for text in [self.kind, self.description] {
-            ensure!(!text.contains(char::is_control), "'{}' is more than one line", text.escape_debug());
+            ensure!(
+                !text.contains(char::is_control),
+                "'{}' has a line break or another control character",
+                text.escape_debug()
+            );
         }
         let mut names = HashSet::new();
         for Member { name, variable, kind } in &self.members {
             for text in [name, kind] {
-                ensure!(is_name(text), "'{}' is empty or more than one line", text.escape_debug());
+                ensure!(
+                    is_name(text),
+                    "'{}' is empty or has a line break or another control character",
+                    text.escape_debug()
+                );
             }
             ensure!(names.insert(name), "it has two members with the name {name}");
             let found = model.table.variables.iter().find(|known| known.name == *variable);
@@ -178,7 +186,11 @@ pub fn terminals(
     let mut names = HashSet::new();
     for terminal in terminals {
         let name = terminal.name;
-        ensure!(is_name(name), "the terminal '{}' is empty or more than one line", name.escape_debug());
+        ensure!(
+            is_name(name),
+            "the terminal '{}' is empty or has a line break or another control character",
+            name.escape_debug()
+        );
         ensure!(names.insert(name), "there are two terminals with the name {name}");
         terminal.check(model, content).with_context(|| format!("the terminal {name}"))?;
     }

@@ -106,7 +106,6 @@ pub mod room {
 
     impl Model for Room {
         const INFO: Info = Info {
-            smooth: true,
             description: "A \"room\"",
             author: "A. Uthor",
             version: "1",
@@ -243,7 +242,7 @@ pub mod types {
     }
 
     impl Model for Types {
-        const INFO: Info = Info { smooth: true, ..Info::new("Types", "types") };
+        const INFO: Info = Info::new("Types", "types");
 
         fn new(_: &Setup) -> Result<Self, Error> {
             Ok(Self {
@@ -418,7 +417,7 @@ pub mod chain {
         /// Limits of the states
         limits = parameter(&LIMIT) in limits;
         /// Whether the states have moved
-        moved = output(&BOOLEAN).exact().depends_on(&[]) in moved;
+        moved = output(&BOOLEAN).exact().depends_on() in moved;
         /// Numbers
         counted = parameter(&COUNT) in counted;
         /// Labels of the ends
@@ -452,13 +451,7 @@ pub mod chain {
         }
     }
 
-    impl ModelExchange for Chain {
-        const INDICATORS: usize = 1;
-
-        fn indicators(&self, indicators: &mut [f64]) {
-            indicators.fill(self.x[0]);
-        }
-    }
+    impl ModelExchange for Chain {}
 
     impl Partials for Chain {
         fn partial(&self, unknown: Name, known: Name) -> Option<f64> {

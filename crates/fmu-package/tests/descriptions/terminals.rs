@@ -30,9 +30,18 @@ fn invalid_terminals_are_rejected() {
     let door = || Terminal::plug("door");
     for (all, message) in [
         (vec![door(), door()], "there are two terminals with the name door"),
-        (vec![Terminal::plug("")], "the terminal '' is empty or more than one line"),
-        (vec![door().description("a\nb")], "the terminal door: 'a\\nb' is more than one line"),
-        (vec![door().signal("", "power")], "the terminal door: '' is empty or more than one line"),
+        (
+            vec![Terminal::plug("")],
+            "the terminal '' is empty or has a line break or another control character",
+        ),
+        (
+            vec![door().description("a\nb")],
+            "the terminal door: 'a\\nb' has a line break or another control character",
+        ),
+        (
+            vec![door().signal("", "power")],
+            "the terminal door: '' is empty or has a line break or another control character",
+        ),
         (
             vec![door().signal("a", "power").signal("a", "outside")],
             "the terminal door: it has two members with the name a",
