@@ -5,7 +5,7 @@ use crate::rules::Observation;
 pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
 use fmi_abi::{BaseType, Standard, is_c_identifier, shown};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::ops::Deref;
 
 /// Model description, with values that the checks derive from it.
@@ -91,7 +91,7 @@ impl Description {
             }
         }
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
-        let (mut names, mut references) = (HashSet::new(), HashSet::new());
+        let (mut names, mut references, mut set) = (HashSet::new(), HashSet::new(), HashMap::new());
         for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             let (listed, output) = (outputs.contains(&index), variable.causality == "output");
@@ -127,16 +127,14 @@ impl Description {
             if variable.display_unit.is_some() && variable.unit.is_none() {
                 add("description.units", format!("{name} has a displayUnit, but no unit"));
             }
-            // Otherwise it would be unclear which start value the importer sets.
-            let is_set = |of: &Variable| of.causality == "parameter" && !of.start.is_empty();
-            if let Some(other) = self.aliases(index).find(|other| *other > index)
-                && is_set(variable)
-                && is_set(&self.variables[other])
+            // If two parameters have one reference and a start each, it is unclear which start value the importer sets.
+            if variable.causality == "parameter"
+                && !variable.start.is_empty()
+                && let Some(other) = set.insert(handle(self.standard, variable), name)
             {
-                let other = &self.variables[other].name;
                 add(
                     "description.references",
-                    format!("{name} and {other} have one reference and a start each"),
+                    format!("{other} and {name} have one reference and a start each"),
                 );
             }
             wrong.extend(faults(variable));
