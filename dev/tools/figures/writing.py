@@ -108,7 +108,8 @@ def for_page(svg: bytes, name: str) -> bytes:
             parent[position : position + 1] = list(element)
     _join_paths(root)
     etree.cleanup_namespaces(root)
-    root.attrib["style"] = f"font-size:{TICK_SIZE}"
+    # Texts inherit their colour.
+    root.attrib.update({"style": f"font-size:{TICK_SIZE}", "fill": "currentColor"})
     return re.sub(rb"\n +", b"\n", bytes(etree.tostring(root, encoding="utf-8", pretty_print=True)))
 
 
@@ -144,7 +145,7 @@ def _restyle(element: Any) -> None:
         if re.match(r"(bold|[67]00)\b", font):
             rules["font-weight"] = "bold"
     if element.tag == f"{SVG}text":
-        rules["fill"] = "currentColor"
+        rules.pop("fill", None)
     if rules.get("font-size") == TICK_SIZE:
         del rules["font-size"]
     for key in ("fill", "stroke"):
