@@ -96,19 +96,22 @@ impl<'a> Instance<'a> {
         self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
     }
 
-    /// Records a fault if an event has changed states but has not reported it, because importers then continue with the old values.
+    /// Records a fault if an event has changed states but has not reported it, because importers then continue with the old values, or if
+    /// a changed state is not declared with `reinit`, because importers may then treat it as continuous.
     fn check_states(&mut self, before: &[f64], declared: bool) -> Outcome {
         let after = self.states()?;
         let table = &self.model.table;
-        let mut pairs = table.states.iter().zip(before.iter().zip(&after));
-        if let Some(((state, _), (before, after))) = pairs.find(|(_, (before, after))| before != after)
-            && !declared
-        {
-            self.model.monitor.fail(format!(
-                "an event changes {} from {before} to {after}, but its result does not have `states_changed: true`, so importers \
-                 continue with the old value",
-                table.name(*state)
-            ));
+        let pairs = table.states.iter().zip(before.iter().zip(&after));
+        for (&(state, _), (before, after)) in pairs.filter(|(_, (before, after))| before != after) {
+            let fault = if !declared {
+                "its result does not have `states_changed: true`, so importers continue with the old value"
+            } else if !table.variables[state as usize].reinit {
+                "its line does not have `.reinit()`, which importers need to know that it jumps"
+            } else {
+                continue;
+            };
+            let name = table.name(state);
+            self.model.monitor.fail(format!("an event changes {name} from {before} to {after}, but {fault}"));
         }
         Ok(())
     }

@@ -171,12 +171,17 @@ fn reading_changes_nothing() {
 
 #[test]
 fn events_declare_that_they_change_states() {
-    assert_eq!(message("hit and reported", "", Standard::Fmi3), "");
-    let message = message("hit", "", Standard::Fmi3);
-    assert!(
-        message.starts_with("an event changes v from ") && message.contains("`states_changed: true`"),
-        "{message}"
-    );
+    let declared = "variables/v/reinit=true";
+    assert_eq!(message("hit and reported", declared, Standard::Fmi3), "");
+    for (of, changes, missing) in
+        [("hit", declared, "`states_changed: true`"), ("hit and reported", "", "`.reinit()`")]
+    {
+        let message = message(of, changes, Standard::Fmi3);
+        assert!(
+            message.starts_with("an event changes v from ") && message.contains(missing),
+            "{of}: {message}"
+        );
+    }
 }
 
 #[test]

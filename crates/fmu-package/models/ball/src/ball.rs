@@ -26,7 +26,7 @@ variables! { for Ball, memory in apex;
     /// Height above the floor
     height = output(&HEIGHT).state() in height;
     /// Upward velocity
-    velocity = output(&VELOCITY).state() in velocity;
+    velocity = output(&VELOCITY).state().reinit() in velocity;
     /// Rate of the height
     der_height as "der(height)" = local(&VELOCITY).derivative_of(height) by |ball| ball.velocity;
     /// Rate of the velocity
