@@ -1,4 +1,5 @@
-//! Monitors the calls of a model while it is evaluated: records its first panic or fault, and ends the process if a call does not return.
+//! Monitors the calls of a model while it is evaluated: records its first panic or fault, reports the progress if it takes long, and ends
+//! the process if a call does not return.
 #![allow(unsafe_code, reason = "the library reports panics to a C function")]
 
 use anyhow::{Result, bail};
@@ -10,11 +11,15 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Default)]
 pub(crate) struct CallMonitor {
     call: Mutex<Option<(&'static str, Instant)>>,
+    /// The present activity, the number of its parts that are done, and the number of all its parts.
+    activity: Mutex<Option<(&'static str, usize, usize)>>,
     fault: Mutex<Option<String>>,
 }
 
 /// Interval at which the duration of the call in progress is checked.
 const INTERVAL: Duration = Duration::from_millis(200);
+/// Time without a report of the progress.
+const SILENCE: Duration = Duration::from_secs(5);
 
 impl CallMonitor {
     /// Records that a call begins, and its name for messages. The call before it then counts as ended.
@@ -22,15 +27,22 @@ impl CallMonitor {
         *lock(&self.call) = Some((call, Instant::now()));
     }
 
-    /// Records that the last call has ended.
+    /// Records that the last call and the last activity have ended.
     pub fn end(&self) {
         *lock(&self.call) = None;
+        *lock(&self.activity) = None;
+    }
+
+    /// Records how far an activity is, which is reported if it takes long.
+    pub fn progress(&self, activity: &'static str, done: usize, all: usize) {
+        *lock(&self.activity) = Some((activity, done, all));
     }
 
     /// Ends this process with an error if a call takes longer than the limit, because nothing else can end an endless loop in the
     /// model.
     pub fn watch(self: &Arc<Self>, model: String, limit: Duration) {
         let watched = Arc::downgrade(self);
+        let mut reported = Instant::now();
         std::thread::spawn(move || {
             while let Some(monitor) = Weak::upgrade(&watched) {
                 if let Some((call, since)) = *lock(&monitor.call)
@@ -42,6 +54,12 @@ impl CallMonitor {
                         limit.as_secs()
                     );
                     std::process::exit(1);
+                }
+                if let Some((activity, done, all)) = *lock(&monitor.activity)
+                    && reported.elapsed() > SILENCE
+                {
+                    eprintln!("note: {model}: the build {activity}: {done} of {all}");
+                    reported = Instant::now();
                 }
                 drop(monitor);
                 std::thread::sleep(INTERVAL);

@@ -7,10 +7,11 @@ use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
 use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
 use fmi_client::{Functions, Library};
+use std::collections::HashSet;
 use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::null;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 /// The function of a library that describes its model; `fmu-export` declares it.
@@ -31,6 +32,8 @@ pub struct LoadedModel {
     pub(crate) groups: Vec<Group>,
     /// The start values by index of the variable, once the model has been checked.
     pub(crate) starts: OnceLock<Vec<Option<Value>>>,
+    /// The variables by which the partial derivatives were compared with differences, each with whether this was after initialization.
+    pub(crate) compared: Mutex<HashSet<(bool, u32)>>,
     /// The directory with the files that the model reads.
     resources: Option<CString>,
     pub(crate) monitor: Arc<CallMonitor>,
@@ -150,7 +153,16 @@ impl LoadedModel {
         let functions = functions.map(|functions| Arc::new(unsafe { Library::of(functions) }));
         let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
-        Ok(Self { table, functions, groups, starts: OnceLock::new(), resources, monitor, _library: library })
+        Ok(Self {
+            table,
+            functions,
+            groups,
+            starts: OnceLock::new(),
+            compared: Mutex::default(),
+            resources,
+            monitor,
+            _library: library,
+        })
     }
 
     /// Returns the directory of resources, if there is one.

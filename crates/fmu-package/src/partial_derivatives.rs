@@ -7,13 +7,15 @@ use crate::sample::{Point, Sampler, model_at};
 use crate::table::Attributes;
 use anyhow::{Result, bail};
 use fmi_abi::{BaseType, Interface, Standard};
+use std::sync::PoisonError;
 
 /// Number of points at which derivatives are compared. A derivative is rejected only if it is wrong at two of them, because one
 /// point may happen to be next to a kink.
 const POINTS: usize = 16;
 
 /// Rejects a model whose partial derivatives differ from difference quotients of its values. If `running`, they are compared in
-/// Continuous-Time Mode, or at communication points if the model offers only Co-Simulation; else in Initialization Mode.
+/// Continuous-Time Mode, or at communication points if the model offers only Co-Simulation; else in Initialization Mode. Derivatives by a
+/// known that were compared for the other FMI version are not compared again.
 pub(crate) fn check(
     model: &LoadedModel,
     starts: &Starts,
@@ -23,6 +25,14 @@ pub(crate) fn check(
 ) -> Result<()> {
     let table = &model.table;
     if !table.partials {
+        return Ok(());
+    }
+    let is_real = |index: &u32| table.variable(*index).is_none_or(|known| known.base() == BaseType::Real);
+    let unknowns: Vec<u32> = unknowns.iter().copied().filter(is_real).collect();
+    let mut compared = model.compared.lock().unwrap_or_else(PoisonError::into_inner);
+    let is_new = |known: &u32| !compared.contains(&(running, *known));
+    let knowns: Vec<u32> = knowns.iter().copied().filter(is_real).filter(is_new).collect();
+    if unknowns.is_empty() || knowns.is_empty() {
         return Ok(());
     }
     let mut sampler = Sampler::new(model, starts.clone(), false);
@@ -40,15 +50,10 @@ pub(crate) fn check(
             points.push(Base { saved, instance, point });
         }
     }
-    let is_real = |index: &u32| table.variable(*index).is_none_or(|known| known.base() == BaseType::Real);
-    let unknowns: Vec<u32> = unknowns.iter().copied().filter(is_real).collect();
-    let knowns: Vec<u32> = knowns.iter().copied().filter(is_real).collect();
-    if unknowns.is_empty() {
-        return Ok(());
-    }
     let sizes = sizes(model, &unknowns, &mut points);
     let mut wrong = Vec::new();
     for (number, known) in knowns.iter().enumerate() {
+        model.monitor.progress("compares the partial derivatives by each variable", number, knowns.len());
         let check = Check { model, running, unknowns: &unknowns, known: *known };
         let found = check.wrong(&mut points, &sizes).into_iter().enumerate();
         wrong.extend(found.filter_map(|(unknown, pair)| Some((unknown, number, pair?))));
@@ -56,6 +61,7 @@ pub(crate) fn check(
     let Some((unknown, known, (provided, found))) =
         wrong.into_iter().min_by_key(|(unknown, known, _)| (*unknown, *known))
     else {
+        compared.extend(knowns.into_iter().map(|known| (running, known)));
         return Ok(());
     };
     let known = knowns[known];

@@ -109,6 +109,7 @@ impl<'a> Simulation<'a> {
         let mut points: Vec<Point> = Vec::new();
         let mut trajectory: Vec<Values> = Vec::new();
         for step in 0..STEPS {
+            self.model.monitor.progress("simulates the model to test its saved states", step, STEPS);
             let _ = self.set(&mut instance, step);
             if SAVED_BEFORE.contains(&step)
                 && let Ok(saved) = instance.save()

@@ -33,7 +33,8 @@ pub(crate) fn check(model: &LoadedModel, starts: &Starts) -> Result<()> {
     let (states, rates): (Vec<u32>, Vec<u32>) = table.states.iter().copied().unzip();
     let mut found = vec![Found::default(); states.len()];
     let mut sampler = Sampler::new(model, starts.clone(), false);
-    for _ in 0..INSTANCES {
+    for number in 0..INSTANCES {
+        model.monitor.progress("compares steps with the derivatives of the states", number, INSTANCES);
         // A model that rejects its start values is reported later.
         let Ok((point, mut instance)) = sampler.draw(None, true, |_| true) else { return Ok(()) };
         if instance.initialized().and_then(|()| instance.run()).is_err() {

@@ -228,7 +228,8 @@ fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<
     let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };
     let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
     let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
-    for &known in knowns {
+    for (number, &known) in knowns.iter().enumerate() {
+        sampler.model.monitor.progress("finds what depends on each variable", number, knowns.len());
         let differentiable = is_differentiable(known) && !reals.is_empty();
         let partials: Vec<_> = samples
             .iter_mut()
