@@ -65,6 +65,11 @@ pub fn new(options: &Options) -> Result<()> {
         Some(name) => name.clone(),
         None => directory.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
+    // Cargo accepts other letters, but the library's name becomes an identifier of C.
+    ensure!(
+        name.is_ascii(),
+        "{name} has letters other than a to z, which an FMU cannot have in its identifier; add --name with letters, digits, - and _"
+    );
     // Cargo checks the name, adds the crate to a workspace above it, and creates a git repository unless there is one above.
     let cargo = cargo();
     let mut command = Command::new(&cargo);
