@@ -1,12 +1,13 @@
 //! The program behind `cargo fmu`, which the README of the crate describes.
 //!
 //! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, whose interface types
-//! `compare` compares. `run` simulates an FMU with the inputs that `inputs` reads, `results` writes the table of results, and `plot`
+//! `compare` compares. `run` simulates an FMU with the inputs that `inputs` reads, for which `motion` compares the interface types, `results` writes the table of results, and `plot`
 //! draws it.
 
 mod builder;
 mod compare;
 mod inputs;
+mod motion;
 mod new;
 mod plot;
 mod project;
@@ -54,6 +55,9 @@ enum Command {
         /// Check this FMU from any tool instead of building FMUs; repeat the option for several FMUs
         #[arg(long)]
         fmu: Vec<PathBuf>,
+        /// Also compare Co-Simulation with Model Exchange for these inputs over time: a CSV file as for `run --input`
+        #[arg(long, value_name = "FILE")]
+        input: Option<PathBuf>,
         #[command(flatten)]
         check: fmu_check::Options,
     },
@@ -78,7 +82,7 @@ fn carry_out(command: &Command) -> Result<ExitCode> {
             builder::build(&Project::find(package)?, build, Purpose::Release, &builder::arguments_of_build())
         }
         Command::Run(options) => run::run(options),
-        Command::Check { package, fmu, check } => run::check(package, fmu, check),
+        Command::Check { package, fmu, input, check } => run::check(package, fmu, input.as_deref(), check),
         Command::Replay(options) => return Ok(fmu_check::replay(options)),
     };
     succeeds.map(|succeeds| if succeeds { ExitCode::SUCCESS } else { ExitCode::FAILURE })

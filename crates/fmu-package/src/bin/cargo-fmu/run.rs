@@ -2,6 +2,7 @@
 
 use crate::builder::{self, Purpose};
 use crate::inputs::{Table, is_exact, named, value};
+use crate::motion::{Comparison, Motion, compare};
 use crate::plot::plot;
 use crate::project::{Package, Project};
 use crate::results::{Column, write_table};
@@ -94,8 +95,13 @@ fn changes(mut pending: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
 }
 
 /// Checks FMUs with fmu-check: the given FMUs or, if none are given, the FMUs of the project, which are built first. Returns false if the
-/// build or a check fails.
-pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
+/// build or a check fails, or if the interface types differ for the inputs in a file.
+pub fn check(
+    package: &Package,
+    given: &[PathBuf],
+    input: Option<&Path>,
+    options: &fmu_check::Options,
+) -> Result<bool> {
     let mut fmus = given.to_vec();
     if fmus.is_empty() {
         let project = Project::find(package)?;
@@ -119,8 +125,26 @@ pub fn check(package: &Package, given: &[PathBuf], options: &fmu_check::Options)
         let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(directory));
         let options = fmu_check::Options { out: out.or(options.out.clone()), ..options.clone() };
         good &= fmu_check::command(fmu, &options) == ExitCode::SUCCESS;
+        if let Some(input) = input {
+            good &= agrees(fmu, input)?;
+        }
     }
     Ok(good)
+}
+
+/// Returns whether both interface types of an FMU have the same results for the inputs in a file. Prints the result.
+fn agrees(path: &Path, input: &Path) -> Result<bool> {
+    // SAFETY: the user asks to run this FMU, which the check has executed before.
+    #[allow(unsafe_code)]
+    let fmu = unsafe { Fmu::open(path) }?;
+    let table = Table::read(input, fmu.description())?;
+    let time = times([None; 2], fmu.description(), Some(&table))?;
+    let Some(comparison) = compare(&fmu, &Motion { time: &time, table: &table, starts: &[] })? else {
+        println!("{}: it has only one interface type, so --input compares nothing", short(path));
+        return Ok(true);
+    };
+    println!("{}: {comparison}", short(path));
+    Ok(matches!(comparison, Comparison::Agree(_)))
 }
 
 fn once(options: &Options) -> Result<bool> {
@@ -174,7 +198,8 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let shown = shown(&options.show, description)?;
     let starts = options.set.iter().map(|(name, value)| starts(description, name, value));
     let starts = starts.collect::<Result<Vec<_>>>()?.concat();
-    let mut time = times(options, description, table.as_ref())?;
+    let mut time = times([options.stop, options.step], description, table.as_ref())?;
+    let points = time.clone();
     let (runs, watch) = follow(fmu.system(), &time, table.as_ref(), &starts, &shown)?;
     let ended = watch.ended().pop();
     let failed = ended.is_none() && !runs.errors.is_empty();
@@ -218,6 +243,14 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     );
     for (_, note) in runs.notes.iter().chain(&runs.errors).filter(|_| !failed) {
         println!("{note}");
+    }
+    if let Some(table) = table.as_ref().filter(|_| !failed) {
+        match compare(&fmu, &Motion { time: &points, table, starts: &starts }) {
+            Ok(Some(result @ Comparison::Agree(_))) => println!("{result}"),
+            Ok(Some(result @ Comparison::Differ(_))) => println!("warning: {result}"),
+            Ok(None) => {}
+            Err(error) => println!("Co-Simulation and Model Exchange cannot be compared: {error:#}"),
+        }
     }
     Ok(!failed)
 }
@@ -270,13 +303,17 @@ fn print_messages(watch: &Watch, all: bool) {
     }
 }
 
-/// Returns the communication points, from the options, the times of the inputs, or the default experiment.
-fn times(options: &Options, description: &Description, table: Option<&Table>) -> Result<Vec<f64>> {
+/// Returns the communication points, from the options `--stop` and `--step`, the times of the inputs, or the default experiment.
+fn times(
+    [own_stop, own_step]: [Option<f64>; 2],
+    description: &Description,
+    table: Option<&Table>,
+) -> Result<Vec<f64>> {
     let [start, stop, step] = description.default_experiment;
     let start = table.and_then(|table| table.time.first().copied()).or(start).unwrap_or(0.0);
     let end_of_table = table.and_then(|table| table.time.last().copied()).filter(|end| *end > start);
-    let stop = options.stop.or(end_of_table).or(stop).unwrap_or(start + 1.0);
-    let step = options.step.or(step).unwrap_or((stop - start) / 500.0);
+    let stop = own_stop.or(end_of_table).or(stop).unwrap_or(start + 1.0);
+    let step = own_step.or(step).unwrap_or((stop - start) / 500.0);
     ensure!(step > 0.0 && stop > start, "--stop {stop} must be after {start}, and --step {step} positive");
     let steps = ((stop - start) / step).round();
     ensure!(
