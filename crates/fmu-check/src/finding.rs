@@ -111,7 +111,7 @@ impl Finding {
         Self { sequence, criterion: Some(criterion), ..self }
     }
 
-    /// Records whether the calls show the finding again. A finding that was not shown again is a note, whatever the reason.
+    /// Records whether the calls show the finding again. A finding that was not shown again is a note.
     pub fn judge(&mut self, proof: Proof) {
         if matches!(proof, Proof::NotShown(_) | Proof::NotRun(_)) {
             self.severity = Severity::Note;

@@ -68,7 +68,7 @@ fn up_to(mut trajectory: Trajectory, succeeded: usize) -> Trajectory {
 fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
     let size = step_size(description);
-    // A default experiment of less than 12 steps has no longer ones.
+    // A default experiment of less than 12 steps is too short for longer steps.
     let times = ((range(description) / size - 4.0) / 8.0).round().max(1.0);
     let far = checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"]) && times > 1.0;
     for (reach, discrete) in [(times, true), (times, false), (1.0, true), (1.0, false)] {

@@ -45,8 +45,9 @@ pub trait FastSteps: CoSimulation {
     /// other cases the function must return false and change nothing; this crate then calls
     /// [`step_any_size`](Self::step_any_size).
     ///
-    /// This crate calls it only after the first `step`. Because it is inlined into the C function, it should handle only
-    /// the most frequent steps, and call only functions that are inlined.
+    /// This crate calls it only after the first `step`. The compiler inlines it into the C function, so keep it short:
+    /// handle only the most frequent steps, and call only functions that can be inlined as well, because any other
+    /// call makes every step save registers.
     fn step_fast(&mut self, size: f64) -> bool;
 
     /// Does the same for steps that [`step_fast`](Self::step_fast) does not handle, such as a step of another size

@@ -31,8 +31,9 @@ struct Group {
     references: Vec<u32>,
     /// Indices of the values in a row.
     indices: Vec<usize>,
-    /// For each variable that has another value than its connector in the system: its index among the references, the change from the
-    /// value of the connector to its value, and the opposite.
+    /// Changes between the value of a connector of the system and the value of its variable, which differ, for example,
+    /// in the unit: the index of the variable among the references, the change from the connector to the variable, and
+    /// its inverse. Variables with the same value as their connector are not listed.
     changes: Vec<(usize, [Change; 2])>,
 }
 

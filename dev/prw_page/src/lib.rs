@@ -61,7 +61,7 @@ struct Section {
     text: String,
 }
 
-/// Returns the page whose text is in this directory of `text`.
+/// Builds a page from the files in one directory of `text` and from the model description.
 fn page(directory: &str, description: &str) -> Result<String> {
     let document = Document::parse(description).context("the model description is not XML")?;
     let root = document.root_element();

@@ -394,7 +394,7 @@ impl<M: Exported> Instance<M> {
         Ok(count)
     }
 
-    /// Fails at the first reference without a variable.
+    /// Fails unless each reference belongs to a variable.
     #[cold]
     #[inline(never)]
     pub fn check_references<R: Reference>(&self, vr: &[R]) -> Outcome {

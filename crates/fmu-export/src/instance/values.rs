@@ -176,7 +176,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Fails at the first reference without a variable of a type in `bases`.
+    /// Fails unless each reference belongs to a variable whose type is one of `bases`.
     pub fn check_types<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
         vr.iter().try_for_each(|vr| self.variable_of(vr.index(), bases).map(drop))
     }

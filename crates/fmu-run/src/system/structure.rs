@@ -62,9 +62,9 @@ impl<'a> SystemStructure<'a> {
     /// Reads the FMUs and checks the connections against their model descriptions.
     ///
     /// # Errors
-    /// Returns [`Error::Fmu`] if an FMU cannot be read. Returns [`Error::Request`] if a component's name is invalid or used twice, or if two different FMUs share a file name, if
-    /// a variable is unknown or has the wrong causality, or if the ends of a connection differ in type or unit, if an input is
-    /// fed twice, or if a start value or time is invalid.
+    /// Returns [`Error::Fmu`] if an FMU cannot be read. Returns [`Error::Request`] if a component's name is invalid or
+    /// used twice, if two different FMUs share a file name, if a variable is unknown or has the wrong causality, if the
+    /// ends of a connection differ in type or unit, if an input is fed twice, or if a start value or time is invalid.
     pub fn check(&'a self) -> Result<CheckedStructure<'a>, Error> {
         let mut checked = CheckedStructure { structure: self, fmus: Vec::new(), units: BTreeMap::new() };
         for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {
@@ -170,7 +170,7 @@ impl CheckedStructure<'_> {
     }
 }
 
-/// Returns the XML document with this element as its root.
+/// Writes `root` and what it contains as an XML document in UTF-8.
 pub(super) fn document(root: &Element) -> Result<Vec<u8>, Error> {
     root.document().map(String::into_bytes).map_err(|error| Error::Fmu(error.to_string()))
 }

@@ -46,7 +46,7 @@ impl System {
             let fmu = match loaded.get(source.as_path()) {
                 Some(fmu) => Arc::clone(fmu),
                 None => {
-                    // SAFETY: the caller guarantees that the libraries are sound.
+                    // SAFETY: the caller of this function has met the requirement of `Loaded::open` for each FMU in the file.
                     let opened = unsafe { Loaded::open(source, false, &mut limits) };
                     let opened = opened.map_err(|error| {
                         let inside = directory.path().canonicalize().unwrap_or_default();
