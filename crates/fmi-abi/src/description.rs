@@ -1,7 +1,7 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
 //! standard or stay empty, and each [`Fault`] is listed.
 
-use crate::{BaseType, Interface, Standard, is_plain_file_name, shown};
+use crate::{BaseType, Interface, Standard, boolean, is_plain_file_name, shown};
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -548,7 +548,7 @@ fn variable(
         nominal: limit("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
         unit: shared("unit", |of| of.unit.clone()),
         display_unit: shared("displayUnit", |of| of.display_unit.clone()),
-        is_relative: matches!(of_both("relativeQuantity"), Some("true" | "1")),
+        is_relative: of_both("relativeQuantity").and_then(boolean) == Some(true),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
         clocked: node.attribute("clocks").is_some(),
@@ -603,7 +603,7 @@ fn unit(node: Node) -> (String, Vec<(String, String)>) {
 /// of FMI 3.0.
 fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
     let others = node.children().filter(|of| {
-        of.has_tag_name("DisplayUnit") && !matches!(of.attribute("inverse"), Some("true" | "1"))
+        of.has_tag_name("DisplayUnit") && of.attribute("inverse").and_then(boolean) != Some(true)
     });
     let others = others.filter_map(|of| {
         let number =
