@@ -33,6 +33,8 @@ attribute! {
     Causality {
         /// Set by the user: before the simulation or, if it is tunable, also during the simulation.
         Parameter = "parameter",
+        /// Sets the sizes of arrays before the simulation (FMI 3.0).
+        StructuralParameter = "structuralParameter",
         /// Calculated from parameters.
         CalculatedParameter = "calculatedParameter",
         /// Set by the importer, before and during the simulation.

@@ -1,7 +1,9 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
 //! standard or stay empty, and each [`Fault`] is listed.
 
-use crate::{BaseType, Interface, Standard, boolean, is_plain_file_name, shown};
+use crate::{
+    BaseType, Causality, Initial, Interface, Standard, Variability, boolean, is_plain_file_name, shown,
+};
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -23,14 +25,14 @@ pub struct Variable {
     pub reference: u32,
     /// Base type; `None` for a clock or an unknown type. Int32 of FMI 3.0 is Integer, Float64 is Real.
     pub base: Option<BaseType>,
-    /// `input`, `output` and so on; `local` by default.
-    pub causality: String,
-    /// `fixed`, `continuous` and so on, with the default of the standard.
-    pub variability: String,
+    /// Causality; local if it is missing or unknown.
+    pub causality: Causality,
+    /// Variability; the default of the standard if it is missing or unknown.
+    pub variability: Variability,
     /// Whether the description contains the variability.
     pub has_variability: bool,
-    /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
-    pub initial: String,
+    /// Source of the first value; the default of the standard, if there is one, if it is missing or unknown.
+    pub initial: Option<Initial>,
     /// Start values as strings, as many as the description contains. If an array has only one, it applies to each
     /// element.
     pub start: Vec<String>,
@@ -107,6 +109,13 @@ impl Variable {
             Some(rest) => *remaining = rest,
             None => (self.dimensions, self.size, self.is_too_large) = (None, None, true),
         }
+    }
+
+    /// Returns whether an importer may set a value before Initialization Mode: the variable is an input, or its first value is the
+    /// start value and it is not constant.
+    pub fn is_settable(&self) -> bool {
+        let is_exact = self.initial == Some(Initial::Exact) && self.variability != Variability::Constant;
+        self.causality == Causality::Input || is_exact
     }
 
     /// Returns whether the values are floating-point numbers.
@@ -524,21 +533,26 @@ fn variable(
         of_type.attribute(name).map(Arc::from).or_else(|| of_declared(declared?))
     };
     let limit = |name| of_both(name).and_then(|value| value.trim().parse().ok());
-    let causality = node.attribute("causality").unwrap_or("local");
+    let causality = node.attribute("causality").and_then(Causality::of_name).unwrap_or(Causality::Local);
     let variability = node.attribute("variability");
     let has_variability = variability.is_some();
-    let variability = variability.unwrap_or_else(|| default_variability(standard, causality, base));
-    let initial = node.attribute("initial").unwrap_or_else(|| default_initial(causality, variability));
+    let variability = variability
+        .and_then(Variability::of_name)
+        .unwrap_or_else(|| default_variability(standard, causality, base));
+    let initial = node
+        .attribute("initial")
+        .and_then(Initial::of_name)
+        .or_else(|| default_initial(causality, variability));
     let product = |sizes: &Vec<usize>| sizes.iter().try_fold(1_usize, |all, size| all.checked_mul(*size));
     let size = dimensions.as_ref().and_then(product);
     Variable {
         name: attribute_or_empty(node, "name"),
         reference: 0,
         base,
-        causality: causality.to_owned(),
-        variability: variability.to_owned(),
+        causality,
+        variability,
         has_variability,
-        initial: initial.to_owned(),
+        initial,
         start: start_values(node, of_type, base),
         dimensions,
         size,
@@ -571,21 +585,26 @@ fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String
     starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect()
 }
 
-/// Returns the default of `initial` from the table in section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0; an empty string if
-/// there is none.
-fn default_initial(causality: &str, variability: &str) -> &'static str {
+/// Returns the default of `initial`, if there is one (table in section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
+fn default_initial(causality: Causality, variability: Variability) -> Option<Initial> {
+    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter};
     match (causality, variability) {
-        ("parameter" | "structuralParameter", _) | ("local" | "output", "constant") => "exact",
-        ("calculatedParameter" | "output" | "local", _) => "calculated",
-        _ => "",
+        (Input | Independent, _) => None,
+        (Parameter | StructuralParameter, _) | (Local | Output, Variability::Constant) => {
+            Some(Initial::Exact)
+        }
+        (CalculatedParameter | Output | Local, _) => Some(Initial::Calculated),
     }
 }
 
-fn default_variability(standard: Standard, causality: &str, base: Option<BaseType>) -> &'static str {
+fn default_variability(standard: Standard, causality: Causality, base: Option<BaseType>) -> Variability {
+    use Causality::{CalculatedParameter, Parameter, StructuralParameter};
     match causality {
-        "parameter" | "calculatedParameter" | "structuralParameter" if standard == Standard::Fmi3 => "fixed",
-        _ if base.is_some_and(BaseType::is_float) => "continuous",
-        _ => "discrete",
+        Parameter | CalculatedParameter | StructuralParameter if standard == Standard::Fmi3 => {
+            Variability::Fixed
+        }
+        _ if base.is_some_and(BaseType::is_float) => Variability::Continuous,
+        _ => Variability::Discrete,
     }
 }
 

@@ -4,7 +4,7 @@ use crate::call_sequence::Kind;
 use crate::rules::Observation;
 pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
-use fmi_abi::{BaseType, Standard, is_c_identifier, shown};
+use fmi_abi::{BaseType, Causality, Initial, Standard, Variability, is_c_identifier, shown};
 use std::collections::{HashMap, HashSet};
 use std::ops::Deref;
 
@@ -94,7 +94,7 @@ impl Description {
         let (mut names, mut references, mut set) = (HashSet::new(), HashSet::new(), HashMap::new());
         for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
-            let (listed, output) = (outputs.contains(&index), variable.causality == "output");
+            let (listed, output) = (outputs.contains(&index), variable.causality == Causality::Output);
             let mut add = |rule, why: String| wrong.push((rule, why));
             if !names.insert(name) {
                 add("description.names", format!("two variables are called {name:?}"));
@@ -128,7 +128,7 @@ impl Description {
                 add("description.units", format!("{name} has a displayUnit, but no unit"));
             }
             // If two parameters have one reference and a start each, it is unclear which start value the importer sets.
-            if variable.causality == "parameter"
+            if variable.causality == Causality::Parameter
                 && !variable.start.is_empty()
                 && let Some(other) = set.insert(handle(self.standard, variable), name)
             {
@@ -139,7 +139,7 @@ impl Description {
             }
             wrong.extend(faults(variable));
         }
-        let independent = self.variables.iter().filter(|of| of.causality == "independent").count();
+        let independent = self.variables.iter().filter(|of| of.causality == Causality::Independent).count();
         if independent > 1 || independent == 0 && self.standard == Standard::Fmi3 {
             let why = format!("{independent} variables have the causality independent");
             wrong.push(("description.independent", why));
@@ -219,52 +219,61 @@ fn early(written: &ModelDescription) -> HashSet<Handle> {
     let listed = unknowns.map(|unknown| unknown.variable);
     let states = written.derivatives.iter().filter_map(|of| written.variables[of.variable].derivative_of);
     let outputs =
-        (0..written.variables.len()).filter(|index| written.variables[*index].causality == "output");
+        (0..written.variables.len()).filter(|index| written.variables[*index].causality == Causality::Output);
     let all = listed.chain(states).chain(outputs);
     all.map(|index| handle(written.standard, &written.variables[index])).collect()
 }
 
-/// Causality, variabilities and values of `initial` that may be combined: the tables of section 2.2.7 of FMI 2.0.5 and section
-/// 2.4.7.4 of FMI 3.0.2.
-const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
-    ("parameter", &["fixed", "tunable"], &["exact"]),
-    ("structuralParameter", &["fixed", "tunable"], &["exact"]),
-    ("calculatedParameter", &["fixed", "tunable"], &["calculated", "approx"]),
-    ("input", &["discrete", "continuous"], &["", "exact"]),
-    ("output", &["constant"], &["exact"]),
-    ("output", &["discrete", "continuous"], &["calculated", "exact", "approx"]),
-    ("local", &["constant"], &["exact"]),
-    ("local", &["fixed", "tunable"], &["calculated", "approx"]),
-    ("local", &["discrete", "continuous"], &["calculated", "exact", "approx"]),
-    ("independent", &["continuous"], &[""]),
-];
+/// Causality, variabilities and values of `initial` that may be combined.
+type Combination = (Causality, &'static [Variability], &'static [Option<Initial>]);
+
+/// The tables of section 2.2.7 of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2.
+#[rustfmt::skip]
+const COMBINATIONS: &[Combination] = {
+    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter};
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+    const EXACT: Option<Initial> = Some(Initial::Exact);
+    const APPROX: Option<Initial> = Some(Initial::Approx);
+    const CALCULATED: Option<Initial> = Some(Initial::Calculated);
+    &[
+        (Parameter, &[Fixed, Tunable], &[EXACT]),
+        (StructuralParameter, &[Fixed, Tunable], &[EXACT]),
+        (CalculatedParameter, &[Fixed, Tunable], &[CALCULATED, APPROX]),
+        (Input, &[Discrete, Continuous], &[None, EXACT]),
+        (Output, &[Constant], &[EXACT]),
+        (Output, &[Discrete, Continuous], &[CALCULATED, EXACT, APPROX]),
+        (Local, &[Constant], &[EXACT]),
+        (Local, &[Fixed, Tunable], &[CALCULATED, APPROX]),
+        (Local, &[Discrete, Continuous], &[CALCULATED, EXACT, APPROX]),
+        (Independent, &[Continuous], &[None]),
+    ]
+};
 
 /// Returns the rules that a single variable breaks.
 fn faults(variable: &Variable) -> Vec<Observation> {
     let (name, mut wrong) = (&variable.name, Vec::new());
     let mut add = |rule, why: String| wrong.push((rule, why));
-    let fits = |(causality, variabilities, _): &&(&str, &[&str], &[&str])| {
-        *causality == variable.causality && variabilities.contains(&variable.variability.as_str())
-    };
-    let (causality, variability, initial) = (&variable.causality, &variable.variability, &variable.initial);
-    match COMBINATIONS.iter().find(fits) {
+    let Variable { causality, variability, initial, .. } = *variable;
+    let row = COMBINATIONS.iter().find(|(of, with, _)| *of == causality && with.contains(&variability));
+    match row {
         _ if variable.base.is_none() || variable.clocked => {}
         None => add("description.combination", format!("{name} is {causality} and {variability}")),
-        Some((.., initials)) if !initials.contains(&initial.as_str()) => {
+        Some((.., initials)) if !initials.contains(&initial) => {
+            let initial = initial.map_or_else(String::new, |initial| initial.to_string());
             let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
             add("description.combination", why);
         }
         Some(_) => {}
     }
-    if variability == "continuous" && !variable.is_float() && variable.base.is_some() {
+    if variability == Variability::Continuous && !variable.is_float() && variable.base.is_some() {
         add("description.combination", format!("{name} is continuous, but not a floating-point number"));
     }
-    let needs_start =
-        ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && variable.base.is_some();
-    if needs_start && variable.start.is_empty() && causality != "independent" && !variable.clocked {
+    let needs_start = matches!(initial, Some(Initial::Exact | Initial::Approx))
+        || causality == Causality::Input && variable.base.is_some();
+    if needs_start && variable.start.is_empty() && causality != Causality::Independent && !variable.clocked {
         add("description.start", format!("{name} ({causality}) has no start value"));
     }
-    if initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
+    if initial == Some(Initial::Calculated) && !variable.start.is_empty() && variable.base.is_some() {
         add("description.start", format!("{name} is calculated and has a start value"));
     }
     if let (Some(min), Some(max)) = (variable.min, variable.max)

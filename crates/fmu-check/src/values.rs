@@ -2,7 +2,7 @@
 
 use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Causality, Variability};
 
 /// Returns values of a variable other than its start values: near numbers, the next or previous integer, the other Boolean, a
 /// non-ASCII string, or bytes with NULs. A floating-point number that starts at its maximum keeps its value. Returns `None` for
@@ -48,14 +48,15 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
         if values.len() == 1000 {
             break;
         }
-        let (Some(size), true) = (variable.size, variable.causality == "input" && !variable.clocked) else {
+        let (Some(size), true) = (variable.size, variable.causality == Causality::Input && !variable.clocked)
+        else {
             continue;
         };
         if variable.once_per_instant {
             continue;
         }
         let (starts, kind) = (variable.starts(), description.kind(index));
-        if variable.is_float() && variable.variability != "discrete" {
+        if variable.is_float() && variable.variability != Variability::Discrete {
             let numbers = (0..size).map(|element| {
                 let start = starts.get(element).copied().unwrap_or(0.0);
                 near(variable, start, 0.1 * ((phase * 7 + index * 3 + element) as f64 * 0.7).sin())
@@ -73,9 +74,9 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
 /// Returns values for at most 1000 continuous inputs: their start values, changed with `near` by the fraction `by`.
 pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
     let is_continuous = |(_, variable): &(usize, &Variable)| {
-        variable.causality == "input"
+        variable.causality == Causality::Input
             && variable.is_float()
-            && variable.variability == "continuous"
+            && variable.variability == Variability::Continuous
             && !variable.clocked
             && !variable.once_per_instant
             && variable.size == Some(variable.starts_count())

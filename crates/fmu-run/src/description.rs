@@ -5,7 +5,7 @@ use crate::change::Change;
 use crate::index::Index;
 use crate::unit::Unit;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
-use fmi_abi::{BaseType, Standard, Value};
+use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
 use fmi_client::VariableNames;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
@@ -32,9 +32,9 @@ pub struct Attributes {
     /// Base type. Int32 of FMI 3.0 is Integer, and Float64 is Real.
     pub base: BaseType,
     /// `input`, `output`, `parameter` and so on; `local` by default.
-    pub causality: String,
+    pub causality: Causality,
     /// `constant`, `fixed`, `tunable`, `discrete` or `continuous`, if given.
-    pub variability: Option<String>,
+    pub variability: Option<Variability>,
     /// Unit of the variable or of its declared type, if given.
     pub unit: Option<Arc<str>>,
     /// Smallest value of the variable or of its declared type, if given.
@@ -317,12 +317,12 @@ impl VariableNames for Description {
 impl Variable {
     /// Returns whether the variable is an input or a parameter, which a caller may set.
     pub(crate) fn is_settable(&self) -> bool {
-        matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
+        matches!(self.causality, Causality::Input | Causality::Parameter | Causality::StructuralParameter)
     }
 
     /// Returns whether the variable is a structural parameter, which determines the sizes of arrays and is set in Configuration Mode.
     pub(crate) fn is_structural(&self) -> bool {
-        self.causality == "structuralParameter"
+        self.causality == Causality::StructuralParameter
     }
 
     /// Returns a copy of the variable for a connector that has another unit.
@@ -390,8 +390,8 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
     let (Some(base), Some(sizes), Some(elements)) = (of.base, &of.dimensions, elements) else { return };
     let attributes = Arc::new(Attributes {
         base,
-        causality: of.causality.clone(),
-        variability: of.has_variability.then(|| of.variability.clone()),
+        causality: of.causality,
+        variability: of.has_variability.then_some(of.variability),
         unit: of.unit.clone(),
         min: of.min,
         max: of.max,

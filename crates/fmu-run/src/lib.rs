@@ -37,7 +37,7 @@ pub use continuous::{Integration, Solver};
 pub use description::{Attributes, Dependencies, Description, Variable};
 pub use error::Error;
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
-pub use fmi_abi::{BaseType, Interface, Standard, Status, Value};
+pub use fmi_abi::{BaseType, Causality, Interface, Standard, Status, Value, Variability};
 pub use fmi_client::Message;
 pub use fmi_client::{Continuous, Event};
 pub use instance::Tolerance;

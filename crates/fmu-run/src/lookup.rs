@@ -3,7 +3,7 @@
 use crate::connector::{Connector, End};
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Causality, Variability};
 
 /// A variable of a component that was found by its name.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +48,9 @@ impl Found<'_> {
         if self.variable.is_settable() {
             return Ok(());
         }
-        let kind = match self.variable.causality.as_str() {
-            "output" => "an output".to_owned(),
-            other => format!("{} variable", article(other)),
+        let kind = match self.variable.causality {
+            Causality::Output => "an output".to_owned(),
+            other => format!("{} variable", article(&other.to_string())),
         };
         request(format!("{name} is read-only: it is {kind}"))
     }
@@ -60,7 +60,7 @@ impl Found<'_> {
     /// 2.4.7.5 of FMI 3.0).
     pub fn check_start(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
-        let constant = self.variable.variability.as_deref() == Some("constant");
+        let constant = self.variable.variability == Some(Variability::Constant);
         if !constant && (self.variable.is_settable() || self.variable.start.is_some()) {
             return Ok(());
         }

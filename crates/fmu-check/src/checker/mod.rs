@@ -11,7 +11,7 @@ use crate::legal::first_illegal;
 use crate::run::{Stop, Workers};
 use crate::worker::interrupted;
 use crate::writer::{MAX_READ, Trajectory, Writer, sample};
-use fmi_abi::{Interface, Standard};
+use fmi_abi::{Causality, Interface, Standard};
 pub use records::Unchecked;
 use records::record;
 use std::collections::HashSet;
@@ -148,7 +148,7 @@ impl Checker {
             let variable = &self.description.variables[*index];
             variable.is_number()
                 && !variable.clocked
-                && (variable.causality == "output" || states.contains(index))
+                && (variable.causality == Causality::Output || states.contains(index))
         };
         self.readable.iter().copied().filter(is_one).collect()
     }

@@ -7,6 +7,7 @@ use crate::description::{DependencyKind, Description, Unknown};
 use crate::values::{near, other_values};
 use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
+use fmi_abi::{Causality, Variability};
 use std::collections::HashSet;
 
 /// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown
@@ -131,9 +132,9 @@ fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>,
     let states = if scalar { description.states() } else { Vec::new() };
     let inputs = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
-        variable.causality == "input"
+        variable.causality == Causality::Input
             && variable.is_float()
-            && variable.variability == "continuous"
+            && variable.variability == Variability::Continuous
             && !variable.once_per_instant
             && !variable.clocked
     });
@@ -146,9 +147,9 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let inputs = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
-        let continuous = variable.is_float() && variable.variability == "continuous";
+        let continuous = variable.is_float() && variable.variability == Variability::Continuous;
         let excluded = continuous || variable.once_per_instant || variable.clocked;
-        variable.causality == "input" && !excluded && description.aliases(*index).count() == 1
+        variable.causality == Causality::Input && !excluded && description.aliases(*index).count() == 1
     });
     for known in inputs.take(checker.at_most(60)) {
         let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
@@ -197,9 +198,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let description = &checker.description;
     let knowns = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
-        let known = variable.causality == "input"
-            || variable.initial == "exact" && variable.variability != "constant";
-        known && !variable.starts().is_empty() && !variable.clocked && variable.is_number()
+        variable.is_settable() && !variable.starts().is_empty() && !variable.clocked && variable.is_number()
     });
     for known in knowns.take(checker.at_most(100)) {
         let unknowns = undeclared(checker, &description.initial_unknowns, known);

@@ -4,13 +4,13 @@ use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::writer::{Part, Trajectory, Writer, value_of};
-use fmi_abi::{BaseType, Interface};
+use fmi_abi::{BaseType, Causality, Interface, Variability};
 
 /// Returns whether a variable is a continuous scalar with double precision.
 pub fn is_continuous_scalar(description: &Description, index: usize) -> bool {
     let variable = &description.variables[index];
     variable.base == Some(BaseType::Real)
-        && variable.variability == "continuous"
+        && variable.variability == Variability::Continuous
         && variable.size == Some(1)
         && !variable.clocked
 }
@@ -28,8 +28,8 @@ pub fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
 
 /// Returns the continuous scalar inputs and, in Model Exchange, the continuous scalar states.
 pub fn knowns(description: &Description, interface: Interface) -> Vec<usize> {
-    let inputs =
-        (0..description.variables.len()).filter(|index| description.variables[*index].causality == "input");
+    let inputs = (0..description.variables.len())
+        .filter(|index| description.variables[*index].causality == Causality::Input);
     let states = if interface == Interface::ModelExchange { description.states() } else { Vec::new() };
     inputs.chain(states).filter(|index| is_continuous_scalar(description, *index)).collect()
 }

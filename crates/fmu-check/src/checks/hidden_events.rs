@@ -9,6 +9,7 @@ use crate::trajectory::step_size;
 use crate::values::inputs_by;
 use crate::writer::Part::{Enter, Leave, Make};
 use crate::writer::{Point, Read, Trajectory, Writer, value_of};
+use fmi_abi::{Causality, Variability};
 
 /// Number of intervals of the integration.
 const INTERVALS: usize = 40;
@@ -21,8 +22,8 @@ fn discrete(checker: &Checker) -> Vec<usize> {
     let mut indices = checker.readable.clone();
     indices.retain(|index| {
         let variable = &checker.description.variables[*index];
-        variable.variability == "discrete"
-            && ["output", "local"].contains(&variable.causality.as_str())
+        variable.variability == Variability::Discrete
+            && [Causality::Output, Causality::Local].contains(&variable.causality)
             && !variable.clocked
     });
     indices.truncate(200);

@@ -8,6 +8,7 @@ use crate::trajectory::{range, step_size};
 use crate::values::near;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
+use fmi_abi::{Causality, Variability};
 
 /// Maximum number of communication steps.
 const MAX_STEPS: usize = 40;
@@ -53,9 +54,9 @@ pub fn compare(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &usize| {
         let variable = &description.variables[*index];
-        variable.causality == "input"
+        variable.causality == Causality::Input
             && variable.is_float()
-            && variable.variability == "continuous"
+            && variable.variability == Variability::Continuous
             && variable.size == Some(1)
             && !variable.start.is_empty()
     };
@@ -293,7 +294,7 @@ fn equal_results(
         }
         outputs.iter().find_map(|variable| {
             let of = &description.variables[*variable];
-            let is_continuous = of.is_float() && of.variability == "continuous";
+            let is_continuous = of.is_float() && of.variability == Variability::Continuous;
             let found =
                 if is_continuous { compared.continuous(*variable) } else { compared.discrete(*variable) };
             let (step, stepped, integrated) = found?;

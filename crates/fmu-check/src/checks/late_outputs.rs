@@ -7,6 +7,7 @@ use crate::trajectory::{range, step_size};
 use crate::values::inputs_by;
 use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
+use fmi_abi::{Causality, Variability};
 
 /// Minimum and maximum number of steps.
 const STEPS: [usize; 2] = [8, 24];
@@ -18,9 +19,9 @@ const SIZE: f64 = 0.93;
 pub fn is_continuous(description: &Description, index: usize) -> bool {
     let variable = &description.variables[index];
     variable.is_float()
-        && variable.variability == "continuous"
+        && variable.variability == Variability::Continuous
         && !variable.clocked
-        && !["input", "independent"].contains(&variable.causality.as_str())
+        && ![Causality::Input, Causality::Independent].contains(&variable.causality)
 }
 
 /// Returns whether the steps of a simulation may have any size.

@@ -7,7 +7,7 @@ use crate::description::{kind_of, type_name};
 use crate::random::Random;
 use crate::writer::{Part, Point, Trajectory, Writer, access};
 use fmi_abi::calls::{Signature, signatures};
-use fmi_abi::{BaseType, Mode};
+use fmi_abi::{BaseType, Causality, Mode};
 
 /// Number of crashes after which no further call sequence of a rule is executed.
 const CRASHES: usize = 40;
@@ -240,11 +240,9 @@ pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let mut settable = checker.readable.clone();
     settable.retain(|index| {
         let variable = &description.variables[*index];
-        let exact = variable.initial == "exact" && variable.variability != "constant";
-        !variable.clocked
-            && (variable.causality == "input" || exact && variable.causality != "structuralParameter")
+        !variable.clocked && variable.is_settable() && variable.causality != Causality::StructuralParameter
     });
-    let is_input = |index: usize| description.variables[index].causality == "input";
+    let is_input = |index: usize| description.variables[index].causality == Causality::Input;
     let size = |index: usize| description.variables[index].size.unwrap_or(1);
     // Adds a call sequence that sets the values in Initialization Mode and, if `at_points` is true, at the first three points.
     let mut add = |values: Vec<(usize, Values)>, at_points: bool| {

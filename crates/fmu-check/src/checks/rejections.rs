@@ -6,7 +6,7 @@ use crate::description::{Variable, kind_of, type_name};
 use crate::finding::status_name;
 use crate::values::{near, other_values};
 use crate::writer::{Calls, Part, Point, Read, Trajectory, Writer, access, difference, step_args};
-use fmi_abi::Interface;
+use fmi_abi::{Causality, Initial, Interface, Variability};
 use std::sync::Arc;
 
 /// Call that an FMU should reject. A rejected call must change nothing.
@@ -71,11 +71,12 @@ fn variable_calls(checker: &Checker, interface: Interface) -> Vec<InvalidCall> {
             false => 1.0 - start.clamp(0.0, 1.0),
         });
         let stepped = interface == Interface::CoSimulation;
-        let is_input = variable.causality == "input"
+        let is_input = variable.causality == Causality::Input
             && !variable.clocked
-            && (stepped || variable.variability == "continuous");
-        let is_tunable_parameter =
-            variable.causality == "parameter" && variable.variability == "tunable" && stepped;
+            && (stepped || variable.variability == Variability::Continuous);
+        let is_tunable_parameter = variable.causality == Causality::Parameter
+            && variable.variability == Variability::Tunable
+            && stepped;
         if (is_input || is_tunable_parameter) && is_first(name) {
             let what = format!("a value for {} and one for a reference that no variable has", variable.name);
             let args = set(checker, vec![reference, unknown], kind, vec![other; 2]);
@@ -103,11 +104,11 @@ fn not_settable(
     type_name: &str,
 ) -> Option<(&'static str, Option<&'static str>, String)> {
     let name = &variable.name;
-    if variable.variability == "constant" {
+    if variable.variability == Variability::Constant {
         Some(("constant", Some("rejections.constant"), format!("a value for the constant {name}")))
-    } else if variable.causality == "output" && variable.initial == "calculated" {
+    } else if variable.causality == Causality::Output && variable.initial == Some(Initial::Calculated) {
         Some(("output", TOLERATED, format!("a value for the output {name}")))
-    } else if variable.causality == "parameter" && variable.variability == "fixed" {
+    } else if variable.causality == Causality::Parameter && variable.variability == Variability::Fixed {
         let group = match type_name {
             "Real" | "Float64" => "fixed",
             "Integer" | "Int32" => "fixed integer",
@@ -130,7 +131,7 @@ fn input_calls(
 ) -> Vec<InvalidCall> {
     let reference = u64::from(variable.reference);
     let another = checker.description.variables.iter().find(|other| {
-        other.causality == "input"
+        other.causality == Causality::Input
             && other.base == variable.base
             && other.reference != variable.reference
             && other.size == Some(1)
@@ -239,10 +240,10 @@ fn integration_calls(states: &[f64]) -> Vec<InvalidCall> {
 /// input before it reaches the invalid value.
 fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     let input = checker.description.variables.iter().find(|variable| {
-        variable.causality == "input"
+        variable.causality == Causality::Input
             && variable.size == Some(1)
             && !variable.clocked
-            && variable.variability != "discrete"
+            && variable.variability != Variability::Discrete
             && variable.base.is_some_and(|base| kind_of(checker.description.standard, base) == kind)
     });
     input.map(|variable| u64::from(variable.reference))
@@ -294,7 +295,7 @@ fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let is_input = |index: &&usize| {
         let variable = &description.variables[**index];
-        variable.causality == "input" && !variable.clocked && !variable.start.is_empty()
+        variable.causality == Causality::Input && !variable.clocked && !variable.start.is_empty()
     };
     let input = checker.readable.iter().find(is_input);
     let Some((index, value)) = input.and_then(|index| Some((*index, other_values(description, *index)?)))

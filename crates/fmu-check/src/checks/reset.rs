@@ -29,9 +29,7 @@ fn start_values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
     let (mut floats, mut others) = (Vec::new(), Vec::new());
     for index in checker.readable.iter().copied() {
         let variable = &description.variables[index];
-        let settable = variable.initial == "exact" && variable.variability != "constant"
-            || variable.causality == "input";
-        if settable && !variable.clocked && !variable.start.is_empty() {
+        if variable.is_settable() && !variable.clocked && !variable.start.is_empty() {
             let list = if variable.is_float() { &mut floats } else { &mut others };
             list.extend(other_values(description, index).map(|value| (index, value)));
         }

@@ -6,7 +6,7 @@ use crate::finding::failure;
 use crate::worker::{EVALUATED, changed_setting, tolerated_growth};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save};
 use crate::writer::{Part, Trajectory, Writer};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Causality, Initial};
 
 /// Checks for leaks by repeating simulations, string setters, resets and saved states. Then checks the settings of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
@@ -24,7 +24,8 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             variable.base == Some(BaseType::String) && variable.size == Some(1) && !variable.clocked
         })
         .filter(|(_, variable)| {
-            variable.causality == "input" || variable.causality == "parameter" && variable.initial == "exact"
+            variable.causality == Causality::Input
+                || variable.causality == Causality::Parameter && variable.initial == Some(Initial::Exact)
         })
         .filter_map(|(index, variable)| Some((index, Values::strings(variable.start.first()?.as_bytes(), 1))))
         .collect();

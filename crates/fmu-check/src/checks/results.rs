@@ -9,6 +9,7 @@ use crate::trajectory::steps;
 use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
+use fmi_abi::Causality;
 
 /// Complete simulation that reads all variables and vectors at every point.
 const COMPLETE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
@@ -121,7 +122,8 @@ pub fn reading(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
 fn read_first(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let outputs = checker.readable.iter().copied();
-    let outputs = outputs.filter(|index| variables[*index].causality == "output").take(checker.at_most(16));
+    let outputs =
+        outputs.filter(|index| variables[*index].causality == Causality::Output).take(checker.at_most(16));
     let mut writer = checker.writer(trajectory);
     let together = writer.write(0, &[Begin, Points(3), Part::Read, Part::Free]).reads;
     let mut single = Vec::new();
@@ -262,7 +264,7 @@ fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64
 /// Checks that the independent variable is the time at the end of each step or, in Model Exchange, at each point.
 pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let is_time = |index: &usize| description.variables[*index].causality == "independent";
+    let is_time = |index: &usize| description.variables[*index].causality == Causality::Independent;
     let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {

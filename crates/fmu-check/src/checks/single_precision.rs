@@ -6,7 +6,7 @@ use crate::finding::{Criterion, any};
 use crate::values::near;
 use crate::writer::Part::{Begin, Enter, Free, Make, Points};
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Causality, Variability};
 
 /// Minimum number of different values of an output. Fewer values may have single precision by coincidence.
 const MIN_VALUES: usize = 8;
@@ -40,8 +40,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut indices = checker.readable.clone();
     indices.retain(|index| {
         let of = &description.variables[*index];
-        let settable = of.causality == "input" || of.initial == "exact" && of.variability != "constant";
-        settable && !of.clocked && of.base == Some(BaseType::Real) && !of.start.is_empty()
+        of.is_settable() && !of.clocked && of.base == Some(BaseType::Real) && !of.start.is_empty()
     });
     let mut writer = checker.writer(trajectory);
     let all = write_values(&mut writer, &indices);
@@ -76,7 +75,9 @@ fn write_values(writer: &mut Writer, indices: &[usize]) -> Vec<SetAndRead> {
         let values: Vec<(usize, Values)> = indices.iter().filter_map(value).collect();
         let is_input = |(index, _): &&(usize, Values)| {
             let of = &description.variables[*index];
-            of.causality == "input" && of.variability == "continuous" && !of.once_per_instant
+            of.causality == Causality::Input
+                && of.variability == Variability::Continuous
+                && !of.once_per_instant
         };
         let inputs: Vec<(usize, Values)> = values.iter().filter(is_input).cloned().collect();
         for (before, values) in [(&[Make, Enter][..], values), (&[Begin, Points(2)], inputs)] {
@@ -144,8 +145,8 @@ fn outputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     indices.retain(|index| {
         let of = &description.variables[*index];
         of.base == Some(BaseType::Real)
-            && of.causality == "output"
-            && of.variability == "continuous"
+            && of.causality == Causality::Output
+            && of.variability == Variability::Continuous
             && !of.clocked
     });
     let mut writer = Writer::new(description, trajectory, &indices);

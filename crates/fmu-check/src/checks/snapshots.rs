@@ -7,6 +7,7 @@ use crate::checker::Checker;
 use crate::description::Description;
 use crate::values::inputs_by;
 use crate::writer::{Read, Trajectory, Writer, value_of};
+use fmi_abi::Variability;
 use std::collections::BTreeSet;
 
 /// Unknowns that a snapshot contains.
@@ -34,7 +35,7 @@ impl Unknowns {
         let description = &checker.description;
         let is_continuous = |index: &usize| {
             let variable = &description.variables[*index];
-            variable.is_float() && variable.variability == "continuous" && !variable.clocked
+            variable.is_float() && variable.variability == Variability::Continuous && !variable.clocked
         };
         let listed = description.outputs.iter().chain(&description.derivatives);
         let all: BTreeSet<usize> = listed.map(|unknown| unknown.variable).filter(is_continuous).collect();

@@ -9,6 +9,7 @@ use crate::trajectory::step_size;
 use crate::values::{inputs_by, is_other_time};
 use crate::writer::Part::Make;
 use crate::writer::{Read, Trajectory, Writer, value_of};
+use fmi_abi::{Causality, Variability};
 use std::sync::Arc;
 
 /// Number of steps of a simulation.
@@ -227,7 +228,7 @@ impl Compared {
     /// Describes a value of the independent variable that is not the time, if all steps return OK.
     fn wrong_time(&self, run: &Run) -> Option<String> {
         let mut variables = self.description.variables.iter();
-        let independent = variables.position(|variable| variable.causality == "independent")?;
+        let independent = variables.position(|variable| variable.causality == Causality::Independent)?;
         let numbers = self.shifted.numbers(run, independent)?;
         let succeeds = self.shifted.is_started(run)
             && self.shifted.steps.iter().all(|(id, _)| run.status(*id) == Some(0));
@@ -247,7 +248,9 @@ fn periodic_variables(checker: &Checker, trajectory: &Trajectory) -> anyhow::Res
     let mut variables = checker.readable.clone();
     variables.retain(|index| {
         let variable = &description.variables[*index];
-        variable.variability == "discrete" && variable.causality != "input" && !variable.clocked
+        variable.variability == Variability::Discrete
+            && variable.causality != Causality::Input
+            && !variable.clocked
     });
     variables.truncate(200);
     if variables.is_empty() || description.start_time < 0.0 {

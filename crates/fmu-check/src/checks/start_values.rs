@@ -9,7 +9,7 @@ use crate::values::other_values;
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
 use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Causality, Initial, Variability};
 use std::sync::Arc;
 
 /// Checks the start values of variables, then the values during the simulation and the constants.
@@ -24,7 +24,8 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     };
     let may_change = |index: &usize| {
         let variable = &model.variables[*index];
-        variable.causality != "input" && ["discrete", "continuous"].contains(&variable.variability.as_str())
+        variable.causality != Causality::Input
+            && [Variability::Discrete, Variability::Continuous].contains(&variable.variability)
     };
     for (number, parts) in states.into_iter().enumerate() {
         let (after, mut writer) = (number == 1 && !checker.fmi3(), checker.writer(trajectory));
@@ -50,7 +51,7 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
 
 /// Returns whether a value equals the start value. Returns true for a variable that may have other values.
 fn is_start(variable: &Variable, value: &Values) -> bool {
-    let must_be_start = variable.initial == "exact" || variable.causality == "input";
+    let must_be_start = variable.initial == Some(Initial::Exact) || variable.causality == Causality::Input;
     if !must_be_start || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
         return true;
     }
@@ -91,7 +92,7 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     }),
     ("start_values.range", |variable, value| {
         let ranged = variable.base.is_some_and(|base| !base.is_float())
-            && ["local", "output"].contains(&variable.causality.as_str());
+            && [Causality::Local, Causality::Output].contains(&variable.causality);
         let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
         let wrong = ranged && value.numbers().iter().any(|number| *number < min || *number > max);
         wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
@@ -135,14 +136,17 @@ fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let variables = &checker.description.variables;
     let tunable = variables.iter().any(|other| {
-        other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
+        other.variability == Variability::Tunable
+            || other.causality == Causality::Input && other.variability == Variability::Fixed
     });
     let mut unchanging = checker.readable.clone();
     unchanging.retain(|index| {
         let variable = &variables[*index];
-        variable.variability == "constant"
-            || !tunable && variable.variability == "fixed" && variable.causality != "input"
-            || variable.causality == "parameter"
+        variable.variability == Variability::Constant
+            || !tunable
+                && variable.variability == Variability::Fixed
+                && variable.causality != Causality::Input
+            || variable.causality == Causality::Parameter
     });
     if unchanging.is_empty() || trajectory.points.is_empty() {
         return Ok(());
@@ -162,8 +166,7 @@ pub fn settable(checker: &Checker) -> Vec<usize> {
     let mut indices = checker.readable.clone();
     indices.retain(|index| {
         let of = &description.variables[*index];
-        let settable = of.causality == "input" || of.initial == "exact" && of.variability != "constant";
-        settable && !of.clocked && !of.start.is_empty() && description.aliases(*index).count() == 1
+        of.is_settable() && !of.clocked && !of.start.is_empty() && description.aliases(*index).count() == 1
     });
     indices
 }
@@ -198,8 +201,10 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     // call is not a finding.
     for index in indices.iter().take(checker.at_most(400)) {
         let of = variable(index);
-        let may_change = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
-        let without_event = of.is_float() || of.variability != "discrete" && trajectory.is_stepped();
+        let may_change = of.causality == Causality::Input
+            || of.variability == Variability::Tunable && trajectory.is_stepped();
+        let without_event =
+            of.is_float() || of.variability != Variability::Discrete && trajectory.is_stepped();
         let is_settable = may_change && without_event && !of.once_per_instant;
         if let Some(value) = with_other(index).filter(|_| is_settable) {
             read_back(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;

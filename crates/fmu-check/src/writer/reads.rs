@@ -3,6 +3,7 @@
 use crate::call_sequence::{Run, Values};
 use crate::description::Description;
 use crate::finding::status_name;
+use fmi_abi::Causality;
 
 /// Call that reads variables or a vector. `variables` has the index and the number of values of each variable; it is empty for a
 /// vector.
@@ -40,7 +41,7 @@ pub fn sample(description: &Description, max_count: usize) -> Vec<usize> {
     }
     let first = |index: &usize| {
         let variable = &description.variables[*index];
-        ["input", "output", "independent"].contains(&variable.causality.as_str())
+        [Causality::Input, Causality::Output, Causality::Independent].contains(&variable.causality)
             || variable.derivative_of.is_some()
     };
     let (first, others): (Vec<usize>, Vec<usize>) = all.into_iter().partition(first);

@@ -100,8 +100,8 @@ impl Variables {
                     let any = |text: Option<&str>| text.into_pyobject(py);
                     [
                         any(Some(&of.base.to_string()))?,
-                        any(Some(&of.causality))?,
-                        any(of.variability.as_deref())?,
+                        any(Some(&of.causality.to_string()))?,
+                        any(of.variability.map(|of| of.to_string()).as_deref())?,
                         any(start.map(|start| &**start))?,
                         any(of.unit.as_deref())?,
                         any(Some(&of.description))?,

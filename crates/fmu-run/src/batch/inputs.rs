@@ -8,7 +8,7 @@ use crate::error::{Error, request};
 use crate::lookup::{Found, article, is_exact};
 use crate::selection::{Selection, fits};
 use crate::system::System;
-use fmi_abi::{BaseType, Standard};
+use fmi_abi::{BaseType, Standard, Variability};
 
 /// Numeric inputs and their values.
 #[derive(Default)]
@@ -57,10 +57,10 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
     let variables = system.find(name)?;
     variables.iter().try_for_each(|found| found.check_own(name))?;
     let of = variables[0].variable;
-    if !of.is_settable() || of.is_structural() || of.variability.as_deref() == Some("fixed") {
+    if !of.is_settable() || of.is_structural() || of.variability == Some(Variability::Fixed) {
         let kind = match &of.variability {
             Some(variability) => format!("{variability} {}", of.causality),
-            None => of.causality.clone(),
+            None => of.causality.to_string(),
         };
         let hint = match variables[0].check_start(name) {
             Ok(()) => "; give it a start value",
@@ -73,7 +73,7 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
 
 /// Returns whether values of a variable are held between the times at which they are given; otherwise they are interpolated.
 pub(super) fn is_held(of: &Variable) -> bool {
-    !of.base.is_float() || of.variability.as_deref().is_some_and(|of| of != "continuous")
+    !of.base.is_float() || of.variability.is_some_and(|of| of != Variability::Continuous)
 }
 
 /// Adds a name. Fails if it is in `names` already.

@@ -8,7 +8,7 @@ use crate::description::Description;
 use crate::error::{Error, request};
 use crate::selection::Selection;
 use crate::system::System;
-use fmi_abi::{BaseType, Interface, Standard};
+use fmi_abi::{BaseType, Causality, Interface, Standard};
 use std::sync::Arc;
 
 /// Checked inputs and settings of runs in Model Exchange.
@@ -97,7 +97,7 @@ impl<'a> ModelExchangePlan<'a> {
         // An input that is declared as the derivative of another input gets the slope of that input, unless the caller has given
         // values for it.
         let declared = self.description.variables.iter().filter(|of| {
-            of.causality == "input"
+            of.causality == Causality::Input
                 && !is_held(of)
                 && !batch.inputs.iter().any(|(name, _)| *name == of.name)
                 && !batch.start.iter().any(|(name, _)| *name == of.name)

@@ -23,7 +23,7 @@ use crate::selection::Selection;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
-use fmi_abi::{BaseType, Interface, shown};
+use fmi_abi::{BaseType, Causality, Interface, shown};
 pub(crate) use order::Exchange;
 pub use order::Order;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -348,7 +348,7 @@ impl System {
         }
         let variables = self.find_numbers(name)?;
         let of = variables[0].variable;
-        if of.base != BaseType::Real || of.causality != "input" {
+        if of.base != BaseType::Real || of.causality != Causality::Input {
             return request(format!("{name} is not a Real input; only these have input derivatives"));
         }
         Ok(variables)
@@ -485,7 +485,7 @@ impl Definition {
         }
         let mut ends = Vec::new();
         for (index, (from, to)) in self.connections.iter().enumerate() {
-            let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
+            let (output, input) = (self.end(from, Causality::Output)?, self.end(to, Causality::Input)?);
             let ((from_fmu, output_of), (to_fmu, input_of)) =
                 ((output.description, output.variable), (input.description, input.variable));
             let checked = match self.changes.get(index) {
@@ -509,9 +509,9 @@ impl Definition {
     }
 
     /// Finds the variable at one end of a connection, and checks its causality.
-    fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
+    fn end(&self, name: &str, wanted: Causality) -> Result<Found<'_>, Error> {
         let found = self.find(name)?[0];
-        match found.variable.causality.as_str() {
+        match found.variable.causality {
             causality if causality == wanted => Ok(found),
             causality => request(format!("{name} is {causality}, not {wanted}")),
         }

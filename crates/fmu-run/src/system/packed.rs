@@ -1,6 +1,7 @@
 //! The FMUs of a system that is written.
 
 use crate::description::{Attributes, Description, Variable};
+use fmi_abi::Variability;
 use fmi_abi::write::unzip;
 use std::path::Path;
 
@@ -63,7 +64,7 @@ impl<'a> FmuVariable<'a> {
     pub fn check_settable(self, name: &str) -> Result<(), String> {
         let Variable { start, .. } = self.variable;
         let Attributes { variability, causality, .. } = &**self.variable;
-        let is_constant = variability.as_deref() == Some("constant");
+        let is_constant = *variability == Some(Variability::Constant);
         match start.is_some() && !is_constant {
             true => Ok(()),
             false => Err(format!("{name} is {causality} and takes no start value")),

@@ -2,6 +2,7 @@
 
 use super::packed::{FmuVariable, PackedFmu};
 use crate::error::{Error, request};
+use fmi_abi::Causality;
 use fmi_abi::write::Element;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -87,14 +88,14 @@ impl<'a> SystemStructure<'a> {
         checked.check_files()?;
         let mut fed = Vec::new();
         for (_, to, start) in &self.inputs {
-            checked.find(to, "input")?.check_start(to, start).map_err(Error::Request)?;
+            checked.find(to, Causality::Input)?.check_start(to, start).map_err(Error::Request)?;
             fed.push(*to);
         }
         for (_, from) in &self.outputs {
-            checked.find(from, "output")?;
+            checked.find(from, Causality::Output)?;
         }
         for (from, to) in &self.connections {
-            let (a, b) = (checked.find(from, "output")?, checked.find(to, "input")?);
+            let (a, b) = (checked.find(from, Causality::Output)?, checked.find(to, Causality::Input)?);
             a.check_feeds(b).map_err(|why| Error::Request(format!("{from} cannot feed {to}: {why}")))?;
             fed.push(*to);
         }
@@ -147,9 +148,9 @@ impl CheckedStructure<'_> {
         fmus.map(|((_, path), fmu)| Ok((file_name(path)?, fmu.bytes.as_slice()))).collect()
     }
 
-    fn find(&self, name: &str, wanted: &str) -> Result<FmuVariable<'_>, Error> {
+    fn find(&self, name: &str, wanted: Causality) -> Result<FmuVariable<'_>, Error> {
         let found = self.variable(name)?;
-        let causality = &found.variable.causality;
+        let causality = found.variable.causality;
         if causality != wanted {
             return request(format!("{name} is {causality}, not {wanted}"));
         }

@@ -4,6 +4,7 @@
 
 use crate::inputs::{Table, is_exact};
 use anyhow::Result;
+use fmi_abi::Causality;
 use fmu_run::{
     BaseType, Batch, Description, Fmu, Integration, Interface, Occurrence, Runs, Start, Trajectory, Value,
     Variable, Watch,
@@ -117,10 +118,13 @@ pub fn compare(fmu: &Fmu, motion: &Motion) -> Result<Option<Comparison>> {
 fn compared(description: &Description) -> Vec<&Variable> {
     let variables = &description.variables;
     let is_state = |name: &str| {
-        variables.iter().any(|of| of.causality != "input" && of.derivative_of.as_deref() == Some(name))
+        variables
+            .iter()
+            .any(|of| of.causality != Causality::Input && of.derivative_of.as_deref() == Some(name))
     };
     let is_compared = |of: &&Variable| {
-        !is_exact(of) && (of.causality == "output" || of.causality == "local" && is_state(&of.name))
+        !is_exact(of)
+            && (of.causality == Causality::Output || of.causality == Causality::Local && is_state(&of.name))
     };
     variables.iter().filter(is_compared).collect()
 }
@@ -316,7 +320,7 @@ impl Judged<'_> {
             .description
             .variables
             .iter()
-            .filter(|of| of.causality == "input" && of.base == BaseType::Real);
+            .filter(|of| of.causality == Causality::Input && of.base == BaseType::Real);
         let missing: Vec<&str> =
             missing.map(|of| of.name.as_str()).filter(|name| !self.moved.contains(name)).collect();
         let missing = match missing.is_empty() {

@@ -1,7 +1,7 @@
 //! The results of a simulation: columns of a table, with the names of enumeration items and with strings.
 
 use anyhow::Result;
-use fmu_run::{BaseType, Description, Value, Variable};
+use fmu_run::{BaseType, Description, Value, Variability, Variable};
 use std::path::Path;
 
 /// A variable over time.
@@ -31,7 +31,7 @@ impl<'a> Column<'a> {
             }
             _ => Vec::new(),
         };
-        let is_held = variable.variability.as_deref().is_some_and(|of| of != "continuous");
+        let is_held = variable.variability.is_some_and(|of| of != Variability::Continuous);
         Self {
             name: &variable.name,
             unit: variable.unit.as_deref().filter(|unit| *unit != "1").unwrap_or_default(),

@@ -7,6 +7,7 @@ use crate::plot::plot;
 use crate::project::{Package, Project};
 use crate::results::{Column, write_table};
 use anyhow::{Context, Result, ensure};
+use fmi_abi::Causality;
 use fmu_package::terminal::{fmi_version, short};
 use fmu_package::{BuildOptions, Standard};
 use fmu_run::{
@@ -327,8 +328,9 @@ fn times(
 /// Returns the variables that are shown: those with these names, or all outputs except bytes if there are no names.
 fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a Variable>> {
     if names.is_empty() {
-        let is_shown =
-            |variable: &&Variable| variable.causality == "output" && variable.base != BaseType::Binary;
+        let is_shown = |variable: &&Variable| {
+            variable.causality == Causality::Output && variable.base != BaseType::Binary
+        };
         let outputs: Vec<_> = description.variables.iter().filter(is_shown).collect();
         ensure!(!outputs.is_empty(), "the model has no outputs; name variables with --show");
         return Ok(outputs);

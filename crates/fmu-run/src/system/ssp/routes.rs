@@ -71,8 +71,8 @@ impl Read<'_> {
                         "the connection between {} and {} has no direction: one is {}, the other {}",
                         shown(&start.name),
                         shown(&end.name),
-                        shown(one),
-                        shown(other)
+                        shown(&one),
+                        shown(&other)
                     ));
                 }
                 _ => (start, end),
@@ -88,9 +88,9 @@ impl Read<'_> {
     }
 
     /// Returns the kind of a connector: the causality of its variable, or as declared for a system.
-    fn kind<'r>(&'r self, definition: &'r Definition, end: &Endpoint) -> Option<&'r str> {
-        let of_component = || definition.look_up(&end.name).map(|found| found.variable.causality.as_str());
-        let of_system = || self.connectors.get(&end.name).map(|connector| connector.kind.as_str());
+    fn kind(&self, definition: &Definition, end: &Endpoint) -> Option<String> {
+        let of_component = || definition.look_up(&end.name).map(|found| found.variable.causality.to_string());
+        let of_system = || self.connectors.get(&end.name).map(|connector| connector.kind.clone());
         match end.is_own {
             true => of_system().or_else(of_component),
             false => of_component().or_else(of_system),
@@ -105,7 +105,7 @@ impl Read<'_> {
             definition.find(&end.name)?;
             return request(format!("there is no connector {}", shown(&end.name)));
         };
-        Ok(match kind {
+        Ok(match kind.as_str() {
             "output" | "calculatedParameter" => Some(!end.is_own),
             "input" | "parameter" | "structuralParameter" => Some(end.is_own),
             _ => None,
