@@ -12,13 +12,12 @@ import subprocess
 import sys
 import time
 import tomllib
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
-#: Crates that are linked into the FMU or that build it.
-OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmi-client", "fmu-export", "fmu-package", "prw_page"}
 #: Packages without unit tests in Rust.
 UNTESTED = {"build_fmu", "fmu-run-python"}
 #: Directory of the FMU that is built here. It has no page, so it must not replace the FMU of `make fmu`.
@@ -50,6 +49,15 @@ def crate(name: str) -> str:
     raise ValueError(f"{name} is outside of the repository")
 
 
+@cache
+def of_the_fmu() -> set[str]:
+    """The crates of the workspace that are linked into the FMU or that build it."""
+    command = ["cargo", "tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--format", "{p}"]
+    command += ["--package", "prw_testbed", "--package", "build_fmu"]
+    printed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return {line.split()[0] for line in printed.splitlines() if f"({ROOT}" in line}
+
+
 def commands(names: list[str]) -> list[list[str]]:
     """The commands that check these files."""
     rust = sorted({crate(name) for name in names if name.endswith((".rs", "Cargo.toml"))})
@@ -68,7 +76,7 @@ def commands(names: list[str]) -> list[list[str]]:
         listed.append([sys.executable, "-m", "ruff", "check", *scripts])
         listed.append([sys.executable, "-m", "ruff", "format", "--check", *scripts])
         listed.append([sys.executable, "-m", "mypy"])
-    if OF_THE_FMU.intersection(rust):
+    if rust and of_the_fmu().intersection(rust):
         listed.append(["cargo", "run", "--locked", "--bin", "build_fmu", "--", "--no-page", "--out", str(FMUS)])
         listed.append([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "auto", *CORE])
     return listed

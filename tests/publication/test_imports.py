@@ -7,74 +7,58 @@ import ast
 import re
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
 from built import ROOT
-from test_readmes import FILES
+from repository import FILES
 
+Graph = dict[str, set[str]]
 PACKAGES = sorted({str(Path(name).parent) for name in FILES if name.endswith("__init__.py")})
-CRATES = sorted({name.split("/src/")[0] + "/src" for name in FILES if re.search(r"(?:^|/)src/.*\.rs$", f"/{name}")})
+CRATES = sorted({name.split("src/")[0] + "src" for name in FILES if re.match(r"(?:.*/)?src/.*\.rs$", name)})
 
 
-def cycle(graph: dict[str, set[str]]) -> list[str]:
-    """Returns modules of which each imports the next; empty if there is no cycle."""
-    try:
-        TopologicalSorter(graph).prepare()
-    except CycleError as error:
-        return list(reversed(error.args[1]))
-    return []
-
-
-def python_imports(name: str, is_package: bool, code: str) -> Iterator[str]:
-    """Yields the absolute names that a module imports, including imports in functions and imports for type checkers."""
-    for node in ast.walk(ast.parse(code)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = name.split(".")[: (None if is_package else -1) if node.level == 1 else -node.level + is_package]
-            module = ".".join([*(above if node.level else []), *filter(None, [node.module])])
-            yield from (f"{module}.{alias.name}" for alias in node.names)
-
-
-def python_graph(package: Path) -> dict[str, set[str]]:
+def python_graph(package: Path) -> Graph:
+    """Returns the modules of a package, each with the modules that it imports, also in functions and for type checkers."""
     files = {path.relative_to(package.parent).with_suffix(""): path for path in package.rglob("*.py")}
     modules = {".".join(name.parts).removesuffix(".__init__"): path for name, path in files.items()}
-    graph: dict[str, set[str]] = {}
+    graph: Graph = {name: set() for name in modules}
     for name, path in modules.items():
-        found = python_imports(name, path.name == "__init__.py", path.read_text(encoding="utf-8"))
-        own = (other if other in modules else other.rpartition(".")[0] for other in found)
-        graph[name] = {other for other in own if other in modules and other != name}
+        home = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            found = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+            if isinstance(node, ast.ImportFrom):
+                module = resolve_name("." * node.level + (node.module or ""), home)
+                found = [f"{module}.{alias}" for alias in found]
+            graph[name] |= {each if each in modules else each.rpartition(".")[0] for each in found} & modules.keys()
+        graph[name].discard(name)
     return graph
 
 
-def without_groups(names: str) -> list[str]:
-    """Returns the paths of a `use`: `a::{b, c::{d, e}}` is a::b, a::c::d and a::c::e."""
-    while group := re.search(r"([\w:]*)\{([^{}]*)\}", names):
-        parts = [group[1] + part.strip() for part in group[2].split(",") if part.strip()]
-        names = names[: group.start()] + ", ".join(parts) + names[group.end() :]
-    return [part.strip().split(" ")[0] for part in names.split(",")]
-
-
 def rust_paths(code: str) -> Iterator[str]:
-    """Yields the paths that start with `crate` or `super`, except in comments and tests."""
+    """Yields the paths that start with `crate` or `super`, except in comments and tests: `a::{b, c}` is a::b and a::c."""
     code = re.split(r"#\[cfg\(test\)\]\s*mod \w+ \{", re.sub(r"//.*", "", code))[0]
     for names in re.findall(r"\buse ((?:crate|super)\b[^;]*);", code):
-        yield from without_groups(" ".join(names.split()))
+        names = " ".join(names.split())
+        while group := re.search(r"([\w:]*)\{([^{}]*)\}", names):
+            parts = ", ".join(group[1] + part.strip() for part in group[2].split(",") if part.strip())
+            names = names[: group.start()] + parts + names[group.end() :]
+        yield from (part.strip().split(" ")[0] for part in names.split(","))
     yield from re.findall(r"(?<!\$)\b(?:crate|super)(?:::\w+)+", re.sub(r"\buse [^;]*;", "", code))
 
 
-def rust_graph(source: Path) -> dict[str, set[str]]:
+def rust_graph(source: Path) -> Graph:
     """Returns the modules of a crate, each with the modules that it uses. The root is left out, because it only lists modules and
     exports their items. Paths that begin with a submodule's name are left out, because a module and its submodules belong together."""
     modules = {}
     for path in source.rglob("*.rs"):
         directories = path.relative_to(source).with_suffix("").parts
         modules["::".join(part for part in directories if part not in ("lib", "main", "mod"))] = path
-    graph: dict[str, set[str]] = {name: set() for name in modules if name}
+    graph: Graph = {name: set() for name in modules if name}
     for name in graph:
-        for path_of_item in rust_paths(modules[name].read_text(encoding="utf-8")):
-            parts, above = path_of_item.split("::"), name.split("::")
+        for item in rust_paths(modules[name].read_text(encoding="utf-8")):
+            parts, above = item.split("::"), name.split("::")
             while parts[:1] == ["super"]:
                 parts, above = parts[1:], above[:-1]
             parts = parts[1:] if parts[:1] == ["crate"] else above + parts
@@ -84,37 +68,29 @@ def rust_graph(source: Path) -> dict[str, set[str]]:
     return graph
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_python_packages(package: str) -> None:
-    assert cycle(python_graph(ROOT / package)) == []
-
-
-@pytest.mark.parametrize("source", CRATES)
-def test_rust_crates(source: str) -> None:
-    assert cycle(rust_graph(ROOT / source)) == []
+@pytest.mark.parametrize("path", [*PACKAGES, *CRATES])
+def test_imports_have_an_order(path: str) -> None:
+    TopologicalSorter((python_graph if path in PACKAGES else rust_graph)(ROOT / path)).prepare()
 
 
 def test_cycles_are_found(tmp_path: Path) -> None:
-    """Finds a Python cycle through imports in a function and for types. In Rust, finds paths in braces, but not in comments and tests.
-    The Rust modules have a cycle only if the use of a submodule by its module counts, too."""
+    """In Python, through imports in functions and for types; in Rust, through braces and `super`, but not in comments and tests."""
     files = {
         "p/__init__.py": "",
         "p/a.py": "def f():\n    from p.b import g\n",
         "p/b.py": "if TYPE_CHECKING:\n    from .a import F\n",
-        "p/c.py": "from p import a, b\n",
         "src/lib.rs": "mod a;\nmod b;\npub use a::A;\n",
-        "src/a.rs": "use crate::{\n    b::{self, B as C},\n    D,\n};\n// crate::c\n#[cfg(test)]\nmod tests {\n    use crate::c::E;\n}\n",
+        "src/a.rs": "use crate::{\n    b::{self, d::C},\n    D,\n};\n// crate::c\n#[cfg(test)]\nmod tests {\n    use crate::c::E;\n}\n",
         "src/b/mod.rs": "mod d;\n",
         "src/b/d.rs": "fn d() -> super::super::a::A {}\n",
         "src/c.rs": "use super::a;\n",
     }
-    for name, text in files.items():
+    for name, content in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    graph = python_graph(tmp_path / "p")
-    assert graph == {"p": set(), "p.a": {"p.b"}, "p.b": {"p.a"}, "p.c": {"p.a", "p.b"}}
-    assert set(cycle(graph)) == {"p.a", "p.b"}
-    rust = rust_graph(tmp_path / "src")
-    assert rust == {"a": {"b"}, "b": set(), "b::d": {"a"}, "c": {"a"}}
-    assert cycle(rust) == []
-    assert set(cycle(rust | {"b": {"b::d"}})) == {"a", "b", "b::d"}
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    python, rust = python_graph(tmp_path / "p"), rust_graph(tmp_path / "src")
+    assert python == {"p": set(), "p.a": {"p.b"}, "p.b": {"p.a"}}
+    assert rust == {"a": {"b", "b::d"}, "b": set(), "b::d": {"a"}, "c": {"a"}}
+    for graph in (python, rust):
+        with pytest.raises(CycleError):
+            TopologicalSorter(graph).prepare()

@@ -1,4 +1,4 @@
-"""Runs benchmarks and generators that `make test` starts nowhere else, with small counts."""
+"""Runs the programs that maintain this repository, which `make test` starts nowhere else, with small counts."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from pathlib import Path
 import pytest
 from benches import instructions
 from built import ROOT, built
-from PIL import Image, ImageSequence
 
 from prw.cli import run as run_command
-from tools import compatibility, figures
+from tools import changed, compatibility, figures
 from tools.documentation import performance
 from tools.figures import animation, plots, screencast
 
@@ -72,8 +71,8 @@ def test_no_use_takes_more_instructions_than_before(fmu: Path) -> None:
     if why := instructions.why_not_measurable():
         pytest.skip(why)
     table = json.loads(instructions.TABLE.read_text(encoding="utf-8"))["instructions"]
-    changed = instructions.differences(instructions.measure(fmu), table)
-    assert not changed, (
+    different = instructions.differences(instructions.measure(fmu), table)
+    assert not different, (
         "look for the cause; if the change is wanted, run `make instructions` and give the reason in the commit"
     )
 
@@ -91,13 +90,6 @@ def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
-    run(sys.executable, "tests/oracle/write_experiments.py", tmp_path)
-    written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}
-    assert len(written) > 10 and all((ROOT / "modelDescription" / path).is_file() for path in written)
-
-
-@pytest.mark.long
 def test_docs_are_written(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "dev/benches", tmp_path / "dev/benches")
     run(sys.executable, "dev/tools", "docs", "--project", tmp_path)
@@ -107,7 +99,7 @@ def test_docs_are_written(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Writes the files of `make figures`, but with two figures and short animations. An unchanged screencast is not replaced."""
+    """Writes the files of `make figures`, but with two figures and short animations."""
     if shutil.which("chromium") is None:
         pytest.skip("chromium is not installed")
     built("prw_controller.fmu")
@@ -123,32 +115,33 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     )
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
     assert len(written) == 5 and all((ROOT / path).is_file() for path in written)
-    shown = figures.SCREENCAST.read_bytes()
-    screencast.record(fmu, figures.SCREENCAST)
-    assert figures.SCREENCAST.read_bytes() == shown
-    # A screencast that differs is replaced.
-    with Image.open(figures.SCREENCAST) as kept:
-        frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(kept)]
-    frames[1].paste("red", (0, 0, 5, 5))
-    frames[0].save(figures.SCREENCAST, save_all=True, append_images=frames[1:])
-    changed = figures.SCREENCAST.read_bytes()
-    screencast.record(fmu, figures.SCREENCAST)
-    assert figures.SCREENCAST.read_bytes() != changed
 
 
 @pytest.mark.long
-def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compatibility_writes_only_its_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for path in (compatibility.RESULTS, compatibility.PAGE.parent):
         path.mkdir(parents=True)
     before = (ROOT / compatibility.PAGE).read_text(encoding="utf-8")
     compatibility.PAGE.write_text(before, encoding="utf-8")
-    row = dict.fromkeys(compatibility.HEADS, "x")
-    (compatibility.RESULTS / "one.json").write_text(json.dumps(row), encoding="utf-8")
+    row = json.dumps(dict.fromkeys(compatibility.HEADS, "x"))
+    (compatibility.RESULTS / "one.json").write_text(row, encoding="utf-8")
     assert run_command("tools", "", {"compatibility": compatibility}, ["compatibility"]) == 0
     after = compatibility.PAGE.read_text(encoding="utf-8")
-    heading = f"## {compatibility.HEADING}\n"
-    table = after.split(heading)[1].split("\n## ")[0]
-    assert table.count("\n|") == 3 and "| x | x | x | x | x | x |" in table
-    rest = [text.split(heading)[0] + text.split(heading)[1].partition("\n## ")[2] for text in (before, after)]
-    assert rest[0] == rest[1]
+    table = re.compile(rf"(?<=^## {compatibility.HEADING}\n).*?(?=^## )", re.DOTALL | re.MULTILINE)
+    assert table.findall(after)[0].count("\n|") == 3 and "| x | x | x | x | x | x |" in after
+    assert table.sub("", after) == table.sub("", before)
+
+
+def test_a_change_is_checked_where_it_is() -> None:
+    """`make check` selects its commands by the changed files."""
+
+    def lines(*names: str) -> list[str]:
+        return [" ".join(command[command[0] == sys.executable :]) for command in changed.commands(list(names))]
+
+    assert lines("docs/checking.md") == []
+    assert lines("dev/tools/changed.py")[0] == "-m ruff check dev/tools/changed.py"
+    model = lines("src/pair.rs", "crates/fmu-run/src/fmu.rs")
+    assert any("clippy" in line and "--package fmu-run --package prw_testbed" in line for line in model)
+    assert any("--test stepping" in line for line in model) and any("build_fmu" in line for line in model)
+    assert not any("build_fmu" in line for line in lines("crates/fmu-run/src/fmu.rs"))
