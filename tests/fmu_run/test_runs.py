@@ -121,6 +121,18 @@ def test_each_run_has_its_own_values(testbed, threads):
         same(runs, by_fmpy(testbed, time, one, start, OUTPUTS), run)
 
 
+@pytest.mark.parametrize("interface", ["co-simulation", "model-exchange"])
+def test_reused_instances_have_the_same_results(testbed, interface):
+    """Also if a parameter is not set again, and from one call to the next."""
+    time, inputs = motion(samples=40)
+    starts = [{"k1": np.linspace(60.0, 200.0, 8), "use_omega": True}, {"theta3_start": 0.1, "start_at_rest": False}, {}]
+    with fmu_run.Fmu(testbed) as fmu:
+        for start in starts:
+            arguments = {"inputs": inputs, "start": start, "outputs": OUTPUTS, "interface": interface, "threads": 2}
+            new, reused = (fmu.run(time, **arguments, reuse=reuse).check() for reuse in (False, True))
+            assert all(new[name].tobytes() == reused[name].tobytes() for name in OUTPUTS)
+
+
 def test_measures_and_kept_times(testbed):
     time, inputs = motion()
     with fmu_run.Fmu(testbed) as fmu:

@@ -132,16 +132,6 @@ impl Selection {
         }
     }
 
-    pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
-        self.groups.iter().flat_map(|Group { component, base, references, .. }| {
-            references.iter().map(|reference| Target {
-                component: *component,
-                base: *base,
-                reference: *reference,
-            })
-        })
-    }
-
     /// Fails if a caller may not set the variables, or not to the values of these rows.
     #[inline]
     pub(crate) fn check(&self, values: &[f64]) -> Result<(), Error> {

@@ -88,12 +88,6 @@ impl<'a> StartValues<'a> {
         self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
-    /// Returns the variables that have start values.
-    pub fn targets(&self) -> impl Iterator<Item = Target> {
-        let values = self.values.iter().map(|(index, _)| *index);
-        self.numbers.iter().map(|(index, _)| *index).chain(values)
-    }
-
     /// Returns the strings, bytes and 64-bit integers of a run or an instance, by its index.
     pub fn values(&self, of: usize) -> impl Iterator<Item = (Target, &Value)> {
         self.values.iter().filter_map(move |(index, values)| Some((*index, one(values, of)?)))

@@ -1,12 +1,11 @@
 //! An instance of a system: one instance of each component.
 
 use crate::instance::{Experiment, Instance};
-use crate::lookup::is_exact;
 use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::{BaseType, Interface, Value};
+use fmi_abi::{Interface, Value};
 use fmi_client::Rejection;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,14 +15,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) struct Saved {
     generation: u64,
     state: fmi_client::Saved,
-}
-
-/// Values of all variables at one time, except variables that are bytes.
-#[derive(Debug, Default, PartialEq)]
-pub(crate) struct Observed {
-    /// Numbers, as bits.
-    bits: Vec<u64>,
-    values: Vec<Value>,
 }
 
 /// Instances of the components. A single instance is stored inline, because with thousands of instances each indirection costs time.
@@ -123,28 +114,6 @@ impl SystemInstance {
         self.components.iter_mut().try_for_each(|instance| instance.reset()).ok()?;
         self.is_due = false;
         Some(self)
-    }
-
-    /// Reads all values except bytes. After an error of an FMU, the instances may no longer be usable.
-    pub fn observe(&mut self) -> Result<Observed, Rejection> {
-        let mut seen = Observed::default();
-        for (instance, component) in self.components.iter_mut().zip(self.system.components()) {
-            for base in BaseType::ALL.into_iter().filter(|base| *base != BaseType::Binary) {
-                let of_base = component.fmu.description.variables.iter().filter(|of| of.base == base);
-                let references: Vec<_> = of_base.map(|of| of.reference).collect();
-                if references.is_empty() {
-                    continue;
-                }
-                if is_exact(base) {
-                    seen.values.extend(instance.get_values(base, &references)?);
-                    continue;
-                }
-                let mut numbers = vec![0.0; references.len()];
-                instance.get_numbers(base, &references, &mut numbers)?;
-                seen.bits.extend(numbers.iter().map(|number| number.to_bits()));
-            }
-        }
-        Ok(seen)
     }
 
     /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.

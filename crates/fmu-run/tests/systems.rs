@@ -1,8 +1,9 @@
 //! Systems of FMUs: messages about wrong connections, and the files of correct systems.
 
+use fmi_abi::write::zip;
 use fmu_run::SystemStructure;
 use std::fs;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -13,10 +14,8 @@ const UNITS: &str = r#"<UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Un
 
 /// Writes an FMU that contains only this model description.
 fn packed(path: PathBuf, description: &str) -> PathBuf {
-    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
-    zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
-    zip.write_all(description.as_bytes()).unwrap();
-    zip.finish().unwrap();
+    let entries = [("modelDescription.xml".to_owned(), description.into())];
+    fs::write(&path, zip(&entries).unwrap()).unwrap();
     path
 }
 

@@ -50,6 +50,7 @@ class Loaded:
         solver: str,
         tolerances: tuple[_Number, _Number, _Number],
         events: bool,
+        reuse: bool,
     ) -> tuple[
         _Array,
         list[str],

@@ -109,6 +109,7 @@ class Model:
         atol: float | None = None,
         max_step: float | None = None,
         events: bool = False,
+        reuse: bool = False,
     ) -> Runs:
         """Run the FMU once, or several times if an argument has a separate value for each run.
 
@@ -179,6 +180,10 @@ class Model:
             `max_step` so that no indicator changes its sign twice between two such times, because these events are not detected.
         events
             Store the outputs before and after each event in `Runs.events`.
+        reuse
+            Let a run reset the instance of an earlier run, even of an earlier call, instead of creating one. This saves time if the FMU
+            takes long to create an instance. Use it only if the reset of the FMU is complete, because otherwise something of one run
+            affects the next; `fmu-check` tests that. It has no effect with `log`, so that the messages of each run are complete.
 
         Returns
         -------
@@ -223,6 +228,7 @@ class Model:
             solver,
             (rtol, atol, max_step),
             events,
+            reuse,
         )
         self._warn_of_unused(inputs or {}, start or {}, interface or "co-simulation")
         runs, raised = Runs(*found[:-1]), found[-1]

@@ -263,6 +263,7 @@ impl Loaded {
         solver: Bound<'py, PyAny>,
         tolerances: [Option<Bound<'py, PyAny>>; 3],
         events: Bound<'py, PyAny>,
+        reuse: Bound<'py, PyAny>,
     ) -> PyResult<Results<'py>> {
         let (model, start) = Start::configured(self.model()?.system(), start.as_ref())?;
         let log = Log::of(log.as_ref())?;
@@ -289,6 +290,7 @@ impl Loaded {
             measures: parsed.map_err(PyValueError::new_err)?,
             threads: arguments::count("threads", threads.as_ref())?,
             read_before_set: arguments::flag("read_before_set", &read_before_set)?,
+            reuse: arguments::flag("reuse", &reuse)?,
             tolerance: arguments::tolerance(&tolerance)?,
             interface: interface.as_ref().map(arguments::interface).transpose()?,
             integration: arguments::integration(&solver, tolerances.each_ref().map(Option::as_ref))?,

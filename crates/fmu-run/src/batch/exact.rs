@@ -9,7 +9,6 @@ use crate::start::exact;
 use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
 use fmi_client::Rejection;
-use std::hash::{Hash, Hasher};
 
 /// An input with its values for all runs. Each value holds until the next one.
 pub(super) struct Input {
@@ -60,21 +59,12 @@ impl Input {
         })
     }
 
-    pub fn targets(&self) -> &[Target] {
-        &self.targets
-    }
-
     fn value(&self, run: usize, time: usize) -> &Value {
         if self.length == 0 {
             return &self.values[0];
         }
         let index = self.indices.as_ref().map_or(time, |indices| indices[time]);
         &self.values[if self.is_each { run * self.length } else { 0 } + index]
-    }
-
-    /// Adds the values of a run to a hash.
-    pub fn hash(&self, run: usize, times: usize, hash: &mut impl Hasher) {
-        (0..times).for_each(|time| self.value(run, time).to_string().hash(hash));
     }
 
     /// Returns whether the value at the time with this index is new: it is the first one, or differs from the one before.

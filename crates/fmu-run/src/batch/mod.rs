@@ -1,6 +1,5 @@
 //! Batches: many runs of an FMU or a system.
 
-mod choice;
 mod exact;
 mod input_rows;
 mod inputs;
@@ -10,7 +9,6 @@ mod model_exchange_plan;
 mod plan;
 mod pulse;
 mod resampling;
-mod reuse;
 mod run;
 mod watch;
 mod worker;
@@ -57,6 +55,10 @@ pub struct Batch<'a> {
     /// Whether outputs are read directly after a step, before the next inputs are set. This is the order of section 4.2.4 of FMI 2.0
     /// and of FMPy. Outputs that depend directly on inputs then lag by one step.
     pub read_before_set: bool,
+    /// Whether a run may reset the instance of an earlier run instead of creating one, which is faster if creating one takes long. Use it
+    /// only for FMUs whose reset removes everything: in many FMUs a parameter, a state or a calculated value survives, and then a run
+    /// depends on earlier ones. With logging on, each run has a new instance all the same.
+    pub reuse: bool,
     /// Relative tolerance for solvers inside the FMU; in Model Exchange also the default of [`Integration::rtol`].
     pub tolerance: Tolerance,
     /// Interface type; `None` means Co-Simulation, or Model Exchange if the FMU has only that.

@@ -1,7 +1,7 @@
 //! Checks a batch and looks up its variables.
 
 use super::exact::Input;
-use super::inputs::{Inputs, Numbers, checked, each_input, is_held, once};
+use super::inputs::{Inputs, checked, each_input, is_held, once};
 use super::model_exchange_plan::ModelExchangePlan;
 use super::{Batch, Measure, Trajectory};
 use crate::continuous::Integration;
@@ -12,8 +12,6 @@ use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface, Standard};
-use std::hash::{DefaultHasher, Hasher};
-use std::sync::Arc;
 
 /// A checked batch.
 pub(super) struct Plan<'a> {
@@ -21,8 +19,6 @@ pub(super) struct Plan<'a> {
     pub runs: usize,
     pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
-    /// Variables of all inputs and input derivatives in Co-Simulation; empty in Model Exchange.
-    pub set_in_steps: Arc<[Target]>,
     pub start: StartValues<'a>,
     /// Inputs whose values `f64` cannot represent.
     pub exact_inputs: Vec<Input>,
@@ -33,6 +29,7 @@ pub(super) struct Plan<'a> {
     pub measures: &'a [Measure],
     pub threads: usize,
     pub read_before_set: bool,
+    pub reuse: bool,
     pub tolerance: Tolerance,
     pub interface: Interface,
     /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
@@ -50,7 +47,6 @@ impl<'a> Plan<'a> {
             runs,
             inputs: Inputs::default(),
             derivatives: Inputs::default(),
-            set_in_steps: Arc::default(),
             start: StartValues::of(system, start)?,
             exact_inputs: Vec::new(),
             outputs: Selection::default(),
@@ -59,6 +55,7 @@ impl<'a> Plan<'a> {
             measures: &batch.measures,
             threads: system.threads(interface, batch.threads, runs)?,
             read_before_set: batch.read_before_set,
+            reuse: batch.reuse,
             tolerance: batch.tolerance,
             interface,
             model_exchange: None,
@@ -110,31 +107,7 @@ impl<'a> Plan<'a> {
             self.derivatives.values.push(checked(name, rate, *trajectory, true, batch.time)?);
             self.derivatives.variables.push(name, &variables);
         }
-        let derivatives = self.derivatives.variables.targets();
-        let exact = self.exact_inputs.iter().flat_map(|input| input.targets()).copied();
-        self.set_in_steps = self.inputs.variables.targets().chain(derivatives).chain(exact).collect();
         Ok(())
-    }
-
-    /// Returns a hash of the values of all inputs in a run.
-    pub fn hash_of_inputs(&self, run: usize) -> u64 {
-        let mut hash = DefaultHasher::new();
-        let times = self.time.len();
-        for numbers in self.inputs.values.iter().chain(&self.derivatives.values) {
-            let of_run = |values: &'a [f64], length| &values[run * length..][..length];
-            let values = match numbers {
-                Numbers::Constant(value) => std::slice::from_ref(value),
-                Numbers::Shared(values) => values,
-                Numbers::EachRun(values) => of_run(values, times),
-                Numbers::Sampled { values, is_each: false, .. } => values,
-                Numbers::Sampled { resampling, values, .. } => of_run(values, resampling.length()),
-            };
-            values.iter().for_each(|value| hash.write_u64(value.to_bits()));
-        }
-        for input in &self.exact_inputs {
-            input.hash(run, times, &mut hash);
-        }
-        hash.finish()
     }
 }
 

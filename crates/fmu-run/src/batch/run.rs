@@ -48,12 +48,12 @@ pub(super) fn run(
         worker.begin();
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
-            && let Some(row) = next()
+            && let Some(mut row) = next()
         {
-            let Row { run, trajectories, measures } = row;
-            let result = perform(&mut worker, run, plan.time, [trajectories, measures]);
+            let run = row.run;
+            let result = perform(&mut worker, &mut row, plan.time);
             if watch.is_cancelled() {
-                failures.push(cancelled(Row { run, trajectories, measures }));
+                failures.push(cancelled(row));
                 break;
             }
             match result {
@@ -85,25 +85,28 @@ pub(super) fn run(
     Ok(Finished { errors, notes, exact: arranged(plan, exact.into_iter().flatten()), events })
 }
 
+impl Row<'_> {
+    /// Sets all results to NaN.
+    fn clear(&mut self) {
+        self.trajectories.fill(f64::NAN);
+        self.measures.fill(f64::NAN);
+    }
+}
+
 /// Records that a run was not finished, because the caller has cancelled the runs.
-fn cancelled(row: Row) -> (usize, Failure) {
-    row.trajectories.fill(f64::NAN);
-    row.measures.fill(f64::NAN);
+fn cancelled(mut row: Row) -> (usize, Failure) {
+    row.clear();
     (row.run, Failure { at: None, text: "cancelled".to_owned(), is_silent: false })
 }
 
 /// Performs a run over these times. If it panics, only this run fails.
-fn perform(
-    worker: &mut Worker,
-    run: usize,
-    times: &[f64],
-    [trajectories, measures]: [&mut [f64]; 2],
-) -> Result<Option<String>, Failure> {
-    caught(|| worker.run(run, times, trajectories, measures)).unwrap_or_else(|text| {
-        trajectories.fill(f64::NAN);
-        measures.fill(f64::NAN);
-        Err(Failure { at: None, text, is_silent: false })
-    })
+fn perform(worker: &mut Worker, row: &mut Row, times: &[f64]) -> Result<Option<String>, Failure> {
+    let result = caught(|| worker.run(row.run, times, row.trajectories, row.measures))
+        .unwrap_or_else(|text| Err(Failure { at: None, text, is_silent: false }));
+    if matches!(result, Err(Failure { at: None, .. })) {
+        row.clear();
+    }
+    result
 }
 
 /// Sorts the values of all runs in the order of [`Runs::exact`](super::Runs::exact).
@@ -139,7 +142,8 @@ fn repeat_with_logging(
             && let Some((run, failure)) = next()
         {
             let times = failure.at.map_or(1, |at| at + 2).min(plan.time.len());
-            let again = perform(&mut worker, *run, &plan.time[..times], [&mut trajectories, &mut measures]);
+            let mut row = Row { run: *run, trajectories: &mut trajectories, measures: &mut measures };
+            let again = perform(&mut worker, &mut row, &plan.time[..times]);
             if let Err(again) = again
                 && again.at == failure.at
             {

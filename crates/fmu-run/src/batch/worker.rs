@@ -5,7 +5,6 @@ use super::input_rows::InputRows;
 use super::measure::Measured;
 use super::plan::Plan;
 use super::pulse::Pulse;
-use super::reuse::{Choice, Reuse};
 use super::watch::{Watch, lock};
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logging};
@@ -17,7 +16,6 @@ use std::sync::Arc;
 use std::time;
 
 /// Failure of a run before the last time.
-#[derive(PartialEq)]
 pub(super) struct Failure {
     /// Index of the time of the failure; `None` if the initialization failed.
     pub at: Option<usize>,
@@ -41,7 +39,8 @@ pub(super) struct Worker<'a> {
     /// Whether this is the thread of the caller, which calls the pulse.
     is_caller: bool,
     pulse: Pulse,
-    pub reuse: Reuse,
+    /// The instance of the previous run, if instances are reused.
+    used: Option<SystemInstance>,
     inputs: InputRows<'a>,
     derivatives: InputRows<'a>,
     /// Index of the current run.
@@ -88,7 +87,7 @@ impl<'a> Worker<'a> {
             feed: None,
             is_caller: number == 0,
             pulse: Pulse::default(),
-            reuse: Reuse::default(),
+            used: None,
             inputs: InputRows::new(&plan.inputs),
             derivatives: InputRows::new(&plan.derivatives),
             number: 0,
@@ -102,13 +101,31 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Returns whether logging is on. Each run then has a new instance, so that its messages are complete.
-    pub fn is_logging(&self) -> bool {
-        self.deadline.is_some() || self.feed.is_some()
+    fn logging(&self) -> Logging {
+        Logging { on: self.deadline.is_some() || self.feed.is_some(), feed: self.feed.clone() }
     }
 
-    pub fn logging(&self) -> Logging {
-        Logging { on: self.is_logging(), feed: self.feed.clone() }
+    /// Returns whether a run may reset the instance of an earlier one. With logging on, it may not, so that the messages of each run are
+    /// complete.
+    fn may_reuse(&self) -> bool {
+        self.plan.reuse && !self.logging().on
+    }
+
+    /// Takes an instance that an earlier batch has kept, if there is one.
+    pub fn begin(&mut self) {
+        if self.may_reuse() {
+            let kept = self.system.pool().take(self.plan.interface);
+            self.used = kept.map(|components| SystemInstance::of(self.system, components));
+        }
+    }
+
+    /// Keeps the instance for a later batch, if the system permits idle instances.
+    pub fn finish(self) {
+        if let Some(used) = self.used
+            && self.system.may_be_idle(self.plan.interface)
+        {
+            self.system.pool().put(self.plan.interface, used.into_components());
+        }
     }
 
     /// Performs a run over these times. If the run reaches the last time, the result may be a note about its end.
@@ -119,43 +136,11 @@ impl<'a> Worker<'a> {
         trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
-        self.report_time(run, self.plan.time[0]);
-        match self.choose(run) {
-            Choice::Reset(instance) => self.perform(instance, run, times, trajectories, measures),
-            Choice::New => self.run_new(run, times, trajectories, measures),
-            Choice::Check(used, changes) => self.check((used, changes), run, times, trajectories, measures),
-        }
-    }
-
-    /// Performs a run in a new instance.
-    pub fn run_new(
-        &mut self,
-        run: usize,
-        times: &[f64],
-        trajectories: &mut [f64],
-        measures: &mut [f64],
-    ) -> Result<Option<String>, Failure> {
-        match self.create() {
-            Ok(instance) => self.perform(instance, run, times, trajectories, measures),
-            Err((text, is_silent)) => {
-                trajectories.fill(f64::NAN);
-                measures.fill(f64::NAN);
-                Err(Failure { at: None, text, is_silent })
-            }
-        }
-    }
-
-    /// Performs a run in this instance, and keeps the instance for later runs if the run is complete.
-    pub fn perform(
-        &mut self,
-        mut instance: SystemInstance,
-        run: usize,
-        times: &[f64],
-        trajectories: &mut [f64],
-        measures: &mut [f64],
-    ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
-        let begin = self.system.pool().trust().may_keep().then(time::Instant::now);
+        self.report_time(run, plan.time[0]);
+        let instance =
+            SystemInstance::renewed(self.used.take(), self.system, plan.interface, &self.logging());
+        let mut instance = instance.map_err(|(text, is_silent)| Failure { at: None, text, is_silent })?;
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run, plan.time.len());
         self.derivatives.begin(&plan.derivatives, run, plan.time.len());
@@ -188,14 +173,9 @@ impl<'a> Worker<'a> {
             }
         }
         let is_complete = stopped.is_none() && self.reached == plan.time.len();
-        let is_usable = is_complete && self.reuse.observe(&mut instance);
-        let mut terminated = if rejected { Ok(()) } else { instance.terminate() };
-        if is_complete && !is_usable {
-            // Reading all values for the comparison has failed and may have made the instance unusable, which is not an error of
-            // the run.
-            terminated = Ok(());
-        } else if is_complete && terminated.is_ok() {
-            self.keep(instance, run, begin.map(|begin| begin.elapsed()));
+        let terminated = if rejected { Ok(()) } else { instance.terminate() };
+        if is_complete && terminated.is_ok() && self.may_reuse() {
+            self.used = Some(instance);
         }
         let Some((at, rejection)) = stopped else {
             return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
@@ -210,20 +190,9 @@ impl<'a> Worker<'a> {
         Err(Failure { at: at.map(|(index, _)| index), text, is_silent: rejection.is_silent() })
     }
 
-    /// Removes and returns the values of the current run that `f64` cannot represent.
-    pub fn take_exact(&mut self) -> Vec<Value> {
-        std::mem::take(&mut self.exact_of_run)
-    }
-
-    /// Returns whether the last finished run has this index and these values that `f64` cannot represent.
-    pub fn has_exact(&self, run: usize, values: &[Value]) -> bool {
-        let last = self.exact.last().filter(|(number, _)| *number == run);
-        last.map_or(values.is_empty(), |(_, found)| found == values)
-    }
-
-    /// Returns whether the run is not visible to the caller: it is repeated with logging on, or only checks the reset.
+    /// Returns whether the run is repeated with logging on, so that only its message is used.
     pub fn is_repeated(&self) -> bool {
-        self.deadline.is_some() || self.reuse.is_check
+        self.deadline.is_some()
     }
 
     /// Records the index and the time of the run for the messages of the FMU.

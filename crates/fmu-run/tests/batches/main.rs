@@ -1,17 +1,18 @@
-//! Runs do not depend on earlier runs, on their order, or on the number of threads, even if a reset of the FMU is incomplete.
+//! Runs do not depend on earlier runs, on their order, or on the number of threads, even if a reset of the FMU is incomplete, unless the
+//! caller requests that instances are reused.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
+#[path = "../c_fmus/mod.rs"]
+mod c_fmus;
 
 use built::Recorded;
 use fmu_run::{Batch, Error, Measure, Runs, Start, Trajectory, Watch};
 use fmu_test_kit::Random;
 
-/// Manners of the FMU, which determine which values survive a reset, and whether the reset or the comparison of instances fails.
-/// Creating a "slow" instance takes long; only slow instances are reset.
-const MANNERS: [&str; 8] =
-    ["good", "state", "parameter", "derived", "slow", "slow no reset", "slow unreadable", "slow parameter"];
+/// Manners of the FMU, which determine which values survive a reset, and whether the reset fails.
+const MANNERS: [&str; 5] = ["good", "state", "parameter", "derived", "no reset"];
 const MEASURES: [Measure; 7] = [
     Measure::Min,
     Measure::Max,
@@ -91,15 +92,23 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() }).collect()
 }
 
+/// How cases are run.
+#[derive(Clone, Copy, Default)]
+struct How {
+    threads: usize,
+    has_bias: bool,
+    reuse: bool,
+}
+
 /// Runs all cases as one batch. The bias is set only if `has_bias`.
-fn run(of: &Recorded, cases: &[Case], threads: usize, has_bias: bool) -> Vec<Expected> {
+fn run(of: &Recorded, cases: &[Case], how: How) -> Vec<Expected> {
     let time = times(cases[0].u.len());
     let each = |value: fn(&Case) -> f64| cases.iter().map(value).collect::<Vec<_>>();
     let (factor, bias) = (each(|case| case.factor), each(|case| case.bias));
     let fails = each(|case| case.fails.map_or(-1.0, |step| step as f64));
-    let u = cases.concat_inputs();
+    let u: Vec<_> = cases.iter().flat_map(|case| case.u.iter().copied()).collect();
     let mut start = vec![("factor", Start::Each(&factor)), ("fails", Start::Each(&fails))];
-    if has_bias {
+    if how.has_bias {
         start.push(("bias", Start::Each(&bias)));
     }
     let batch = Batch {
@@ -109,21 +118,12 @@ fn run(of: &Recorded, cases: &[Case], threads: usize, has_bias: bool) -> Vec<Exp
         outputs: vec!["y"],
         every: Some(1),
         measures: MEASURES.to_vec(),
-        threads: Some(threads),
+        threads: Some(how.threads.max(1)),
+        reuse: how.reuse,
         ..Batch::default()
     };
     let runs = of.fmu().run(&batch, &Watch::default()).unwrap();
     found(&runs, time.len())
-}
-
-trait Inputs {
-    fn concat_inputs(&self) -> Vec<f64>;
-}
-
-impl Inputs for [Case] {
-    fn concat_inputs(&self) -> Vec<f64> {
-        self.iter().flat_map(|case| case.u.iter().copied()).collect()
-    }
 }
 
 /// Returns the results of each run, for comparison with the expected ones.
@@ -157,24 +157,28 @@ fn case(random: &mut Random, times: usize) -> Case {
     Case { factor, bias, fails, u: u.collect() }
 }
 
-/// Successive batches have the same results as runs in new instances, even if some runs fail or have NaN.
+/// Successive batches have the same results as runs in new instances, even if some runs fail or have NaN: with any reset if instances are
+/// not reused, and if they are, with a reset that is complete or fails.
 #[test]
 fn runs_are_independent() {
     for seed in 0..60 {
         let random = &mut Random(seed);
         let manner = MANNERS[random.below(MANNERS.len())];
+        let is_reusable = matches!(manner, "good" | "no reset");
         let mut recorded = Recorded::open(manner, "");
         for _ in 0..1 + random.below(11) {
-            // A batch: cases with the same number of times, the number of threads, and whether the bias is set.
+            // A batch of cases with the same number of times.
             let times = 2 + random.below(7);
             let cases: Vec<_> = (0..1 + random.below(6)).map(|_| case(random, times)).collect();
             let (threads, has_bias) = (1 + random.below(3), random.chance(0.5));
+            let how = How { threads, has_bias, reuse: is_reusable && random.chance(0.5) };
             let expected: Vec<_> = cases.iter().map(|case| case.expected(has_bias)).collect();
-            assert_eq!(run(&recorded, &cases, threads, has_bias), expected, "{manner}, seed {seed}");
+            assert_eq!(run(&recorded, &cases, how), expected, "{manner}, seed {seed}");
         }
         drop(recorded.fmu.take());
-        let [made, _, freed] = recorded.counts();
+        let [made, reset, freed] = recorded.counts();
         assert_eq!(made, freed, "{manner}, seed {seed}");
+        assert!(is_reusable || reset == 0, "{manner}, seed {seed}");
     }
 }
 
@@ -182,56 +186,43 @@ fn single(factor: f64) -> Case {
     Case { factor, bias: 0.0, fails: None, u: vec![1.0, 2.0, 3.0] }
 }
 
+/// Instances are reset in a batch and from one batch to the next, but only if the caller requests it.
 #[test]
-fn instances_are_used_again_if_they_can_be_reset() {
-    let recorded = Recorded::open("slow", "");
-    for k in 0..50 {
-        let case = single(f64::from(k));
-        assert_eq!(run(&recorded, std::slice::from_ref(&case), 1, true), [case.expected(true)], "run {k}");
-    }
-    let [made, reset, freed] = recorded.counts();
-    // Creating an instance takes more than 1 ms and a run much less, so that checks of the reset are soon due.
-    assert!(made < 15 && reset > 35 && freed < made, "{made} {reset} {freed}");
-    recorded.fmu().release();
-    let [made, _, freed] = recorded.counts();
-    assert_eq!(made, freed);
-    // Runs are still possible after the release.
-    assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
-}
-
-#[test]
-fn instances_that_must_not_stay_are_freed() {
-    for attribute in ["canBeInstantiatedOnlyOncePerProcess=\"true\"", ""] {
-        let recorded = Recorded::open("slow", attribute);
-        for k in 0..10 {
-            run(&recorded, &[single(f64::from(k))], 1, true);
-        }
-        let [made, reset, freed] = recorded.counts();
-        assert_eq!((made - freed, reset > 0), if attribute.is_empty() { (1, true) } else { (0, false) });
-    }
-}
-
-#[test]
-fn an_fmu_whose_reset_forgets_has_new_instances() {
-    for manner in ["slow state", "slow derived", "slow parameter", "slow no reset", "slow unreadable"] {
+fn instances_are_reused_on_request() {
+    let reuse = How { reuse: true, ..How::default() };
+    for (manner, how, expected) in [
+        ("good", reuse, [1, 79, 0]),
+        ("good", How::default(), [80, 0, 80]),
+        // Each reset fails, so each run has a new instance.
+        ("no reset", reuse, [80, 79, 79]),
+    ] {
         let recorded = Recorded::open(manner, "");
         for k in 0..40 {
-            let case = Case { bias: 0.5, ..single(f64::from(k + 1)) };
-            let has_bias = k % 2 == 0;
-            let found = run(&recorded, std::slice::from_ref(&case), 1, has_bias);
-            assert_eq!(found, [case.expected(has_bias)], "{manner}, run {k}");
+            let cases = [single(f64::from(k)), single(f64::from(k) + 0.5)];
+            let results: Vec<_> = cases.iter().map(|case| case.expected(false)).collect();
+            assert_eq!(run(&recorded, &cases, how), results, "{manner}, batch {k}");
         }
-        let [made, reset, freed] = recorded.counts();
-        assert!(
-            made >= 40 && (1..20).contains(&reset) && freed >= made - 1,
-            "{manner}: {made} {reset} {freed}"
-        );
+        assert_eq!(recorded.counts(), expected, "{manner}");
+        recorded.fmu().release();
+        let [made, _, freed] = recorded.counts();
+        assert_eq!(made, freed);
+        // Runs are still possible after the release.
+        assert_eq!(run(&recorded, &[single(3.0)], how), [single(3.0).expected(false)]);
+    }
+}
+
+#[test]
+fn instances_that_must_not_be_idle_are_freed() {
+    let recorded = Recorded::open("good", "canBeInstantiatedOnlyOncePerProcess=\"true\"");
+    for batch in 1..10 {
+        run(&recorded, &[single(1.0), single(2.0)], How { reuse: true, ..How::default() });
+        assert_eq!(recorded.counts(), [batch; 3]);
     }
 }
 
 #[test]
 fn threads_run_an_fmu_at_the_same_time() {
-    for manner in MANNERS {
+    for (manner, reuse) in [("good", true), ("state", false), ("no reset", true)] {
         let recorded = Recorded::open(manner, "");
         std::thread::scope(|scope| {
             for thread in 0..6 {
@@ -241,7 +232,8 @@ fn threads_run_an_fmu_at_the_same_time() {
                         let cases: Vec<_> =
                             (0..1 + k % 3).map(|n| single(f64::from(100 * thread + k + n))).collect();
                         let expected: Vec<_> = cases.iter().map(|case| case.expected(false)).collect();
-                        assert_eq!(run(recorded, &cases, 2, false), expected, "{manner}");
+                        let how = How { threads: 2, has_bias: false, reuse };
+                        assert_eq!(run(recorded, &cases, how), expected, "{manner}");
                     }
                 });
             }
@@ -269,5 +261,5 @@ fn a_pulse_cancels_runs() {
         assert!(watch.done() < factor.len());
     }
     // A cancelled run does not affect later runs.
-    assert_eq!(run(&recorded, &[single(3.0)], 1, true), [single(3.0).expected(true)]);
+    assert_eq!(run(&recorded, &[single(3.0)], How::default()), [single(3.0).expected(false)]);
 }

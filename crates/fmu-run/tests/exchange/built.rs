@@ -1,35 +1,8 @@
 //! Compiles and packs the FMUs of `models.c`.
 
-use fmu_run::{Fmu, Standard, System};
-use fmu_test_kit::c_programs::headers;
-use std::fs::File;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use crate::c_fmus::{compiled, open, pack};
+use fmu_run::{Standard, System};
 use std::sync::OnceLock;
-use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
-
-/// Returns the library, compiled once.
-fn library() -> &'static Path {
-    static COMPILED: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, path) = COMPILED.get_or_init(|| {
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/exchange");
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("models.so");
-        let status = Command::new("cc")
-            .args(["-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-I"])
-            .arg(headers(&source))
-            .arg(source.join("models.c"))
-            .arg("-lm")
-            .arg("-o")
-            .arg(&path)
-            .status();
-        assert!(status.expect("these tests need a C compiler").success());
-        (directory, path)
-    });
-    path
-}
 
 /// Returns the numbers of states and of event indicators.
 fn sizes(model: &str) -> (usize, usize) {
@@ -110,22 +83,11 @@ pub fn opened(model: &str, standard: Standard) -> System {
 
 /// Opens a model and adds attributes to its element ModelExchange.
 pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> System {
-    let (xml, platform) = match standard {
-        Standard::Fmi2 => (description2(model, attributes), "linux64"),
-        Standard::Fmi3 => (description3(model, attributes), "x86_64-linux"),
-    };
+    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
+    let library = LIBRARY.get_or_init(|| compiled("exchange/models.c", "cc", &["-Wl,--no-as-needed", "-lm"]));
+    let describe = if standard == Standard::Fmi2 { description2 } else { description3 };
     let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join(format!("{model}.fmu"));
-    let mut archive = zip::ZipWriter::new(File::create(&path).unwrap());
-    let library = std::fs::read(library()).unwrap();
-    for (name, content) in [
-        ("modelDescription.xml".to_owned(), xml.into_bytes()),
-        (format!("binaries/{platform}/models.so"), library),
-    ] {
-        archive.start_file(name, SimpleFileOptions::default()).unwrap();
-        archive.write_all(&content).unwrap();
-    }
-    archive.finish().unwrap();
-    // SAFETY: the FMU of these tests.
-    unsafe { Fmu::open(&path) }.unwrap().system().clone()
+    let path = directory.path().join("model.fmu");
+    pack(&path, standard, describe(model, attributes), ("models", library), &[]);
+    open(&path).system().clone()
 }

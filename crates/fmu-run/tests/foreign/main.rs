@@ -4,6 +4,8 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
+#[path = "../c_fmus/mod.rs"]
+mod c_fmus;
 mod opening;
 mod ssp;
 

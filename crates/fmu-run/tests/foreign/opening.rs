@@ -1,7 +1,8 @@
 //! Opens FMUs and files that are not FMUs.
 
-use crate::built::{built, packed};
+use crate::built::built;
 use crate::end;
+use fmi_abi::write::zip;
 use fmu_run::{Error, Fmu, Order, Standard, System};
 use std::path::Path;
 
@@ -23,9 +24,8 @@ fn messages_say_what_a_file_is() {
         path
     };
     let archive = |name: &str, entries: &[(&str, &str)]| {
-        let path = directory.path().join(name);
-        packed(&path, entries.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec())));
-        path
+        let entries = entries.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        file(name, &zip(&entries.collect::<Vec<_>>()).unwrap())
     };
     let xml = |version: &str, rest: &str| {
         format!(
@@ -97,7 +97,7 @@ fn unusual_archives_are_read() {
             (format!("binaries\\{platform}\\foreign.so"), library),
             ("resources\\gain.txt".to_owned(), b"1.5".to_vec()),
         ];
-        packed(&strange, entries);
+        std::fs::write(&strange, zip(&entries).unwrap()).unwrap();
         let fmu = opened(&strange).unwrap();
         assert_eq!((end(&fmu), fmu.name()), (Ok(2.5), "For\u{eb}ign"));
     }
