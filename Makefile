@@ -322,7 +322,7 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 
 FMU_RUN := Cargo.lock $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
   src/*.rs src/*/*.rs src/*/*/*.rs python/src/*.rs python/fmu_run/*)\
-  $(foreach crate,fmi-abi fmi-client,crates/$(crate)/*.toml crates/$(crate)/src/*.rs crates/$(crate)/src/*/*.rs))
+  $(addprefix crates/fmi-abi/,*.toml src/*.rs src/*/*.rs))
 
 # In a separate target directory, so that it need not wait until cargo has compiled the FMU.
 $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | $(VENV)/build.stamp need-rust

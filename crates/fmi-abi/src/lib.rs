@@ -6,6 +6,9 @@ pub mod c_types;
 #[allow(unsafe_code, reason = "it calls functions through their addresses")]
 pub mod calls;
 mod causality;
+#[cfg(feature = "client")]
+#[allow(unsafe_code, reason = "it calls FMUs and receives their messages")]
+pub mod client;
 #[cfg(feature = "description")]
 pub mod description;
 #[cfg(feature = "files")]

@@ -4,8 +4,8 @@
 
 use crate::model::{Group, LoadedModel};
 use crate::table::Variable;
+use fmi_abi::client::{Continuous, Rejection, Settings};
 use fmi_abi::{BaseType, Interface, Standard, Value};
-use fmi_client::{Continuous, Rejection, Settings};
 
 /// The result of a call; the error is the message of the model.
 pub(crate) type Outcome<T = ()> = Result<T, String>;
@@ -16,14 +16,14 @@ pub(crate) struct Instance<'a> {
     pub interface: Interface,
     standard: Standard,
     event_mode: bool,
-    client: fmi_client::Instance,
+    client: fmi_abi::client::Instance,
     pub time: f64,
 }
 
 /// A saved state of an instance, and its time.
 #[derive(Clone, Copy)]
 pub(crate) struct Saved {
-    state: fmi_client::Saved,
+    state: fmi_abi::client::Saved,
     pub time: f64,
 }
 
@@ -43,7 +43,7 @@ impl<'a> Instance<'a> {
             ..Settings::new(interface)
         };
         model.monitor.begin("the instantiation");
-        let client = fmi_client::Instance::new(model.functions(standard), &settings).map_err(message)?;
+        let client = fmi_abi::client::Instance::new(model.functions(standard), &settings).map_err(message)?;
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
     }
 
@@ -58,7 +58,7 @@ impl<'a> Instance<'a> {
     }
 
     /// Returns the client for a call, and records the call, which has this name in messages.
-    fn client(&mut self, call: &'static str) -> &mut fmi_client::Instance {
+    fn client(&mut self, call: &'static str) -> &mut fmi_abi::client::Instance {
         self.model.monitor.begin(call);
         &mut self.client
     }

@@ -4,9 +4,9 @@ use crate::arrays::{Array, Arrays};
 use crate::change::Change;
 use crate::index::Index;
 use crate::unit::Unit;
+use fmi_abi::client::VariableNames;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
-use fmi_client::VariableNames;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 

@@ -7,8 +7,8 @@ use crate::fmu::Loaded;
 use crate::library::Library;
 use crate::messages::Logging;
 use fmi_abi::Interface;
+use fmi_abi::client::{Rejection, Settings, VariableNames};
 use fmi_abi::description::ModelDescription;
-use fmi_client::{Rejection, Settings, VariableNames};
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Instance {
     // First field, so that it is dropped before the library is unloaded.
-    pub(crate) client: fmi_client::Instance,
+    pub(crate) client: fmi_abi::client::Instance,
     _library: Arc<Library>,
     description: Arc<Description>,
     pub(crate) arrays: Arc<Arrays>,
@@ -98,7 +98,7 @@ impl Instance {
             names: Some(Arc::clone(&fmu.description) as Arc<dyn VariableNames>),
             ..Settings::new(interface)
         };
-        let client = fmi_client::Instance::new(&library.client, &settings).map_err(|rejection| {
+        let client = fmi_abi::client::Instance::new(&library.client, &settings).map_err(|rejection| {
             let no_message = || {
                 format!("the instantiation of {} returned NULL without a message", fmu.description.model_name)
             };
@@ -175,17 +175,17 @@ impl Instance {
     }
 }
 
-/// All other functions are called on the instance of fmi-client.
+/// All other functions are called on the instance of `fmi_abi::client`.
 impl Deref for Instance {
-    type Target = fmi_client::Instance;
+    type Target = fmi_abi::client::Instance;
 
-    fn deref(&self) -> &fmi_client::Instance {
+    fn deref(&self) -> &fmi_abi::client::Instance {
         &self.client
     }
 }
 
 impl DerefMut for Instance {
-    fn deref_mut(&mut self) -> &mut fmi_client::Instance {
+    fn deref_mut(&mut self) -> &mut fmi_abi::client::Instance {
         &mut self.client
     }
 }

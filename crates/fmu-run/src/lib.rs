@@ -4,7 +4,7 @@
 //!
 //! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors; [`Instances`] are
 //! stateful and controlled by the caller. The module `continuous` integrates runs in Model Exchange. In `description`, array elements
-//! are variables, which `instance` and `values` read and set through `fmi-client`. A caller needs `unsafe` only to open an
+//! are variables, which `instance` and `values` read and set through `fmi_abi::client`. A caller needs `unsafe` only to open an
 //! [FMU](Fmu::open) or a [system](System::open).
 
 mod arrays;
@@ -36,10 +36,10 @@ pub use batch::{Batch, Finished, Measure, Occurrence, Planned, Runs, Size, Traje
 pub use continuous::{Integration, Solver};
 pub use description::{Attributes, Dependencies, Description, Variable};
 pub use error::Error;
+pub use fmi_abi::client::Message;
+pub use fmi_abi::client::{Continuous, Event};
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
 pub use fmi_abi::{BaseType, Causality, Interface, Standard, Status, Value, Variability};
-pub use fmi_client::Message;
-pub use fmi_client::{Continuous, Event};
 pub use instance::Tolerance;
 pub use instances::{Instances, Mask, Setup, States};
 pub use messages::Logged;

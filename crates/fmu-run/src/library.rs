@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// A loaded library and the files of its FMU.
 #[derive(Debug)]
 pub(crate) struct Library {
-    pub client: Arc<fmi_client::Library>,
+    pub client: Arc<fmi_abi::client::Library>,
     /// Location of the resources, as it is passed to the FMU; `None` for NULL.
     pub resources: Option<CString>,
     // Last field, so that the files are removed after the library is unloaded.
@@ -20,7 +20,7 @@ impl Library {
     /// Loads a library.
     ///
     /// # Safety
-    /// The requirement of [`fmi_client::Library::load`].
+    /// The requirement of [`fmi_abi::client::Library::load`].
     pub unsafe fn load(
         path: &Path,
         standard: Standard,
@@ -28,7 +28,7 @@ impl Library {
         files: Arc<Files>,
     ) -> Result<Self, impl std::error::Error> {
         // SAFETY: the caller guarantees that loading is sound.
-        let client = unsafe { fmi_client::Library::load(path, standard) };
+        let client = unsafe { fmi_abi::client::Library::load(path, standard) };
         client.map(|client| Self { client: Arc::new(client), resources, _files: files })
     }
 }

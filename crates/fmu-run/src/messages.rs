@@ -1,6 +1,6 @@
 //! Collects the messages of FMUs for callers that request all of them.
 
-use fmi_client::{LogListener, Message};
+use fmi_abi::client::{LogListener, Message};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

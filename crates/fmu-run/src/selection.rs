@@ -5,8 +5,8 @@ use crate::connector::End;
 use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
+use fmi_abi::client::Rejection;
 use fmi_abi::{BaseType, Standard};
-use fmi_client::Rejection;
 use std::collections::HashMap;
 
 /// Variables that have been looked up by name, and whose values are numbers or Booleans. A row has one value for each name, in

@@ -5,8 +5,8 @@ use crate::messages::Logging;
 use crate::selection::{Selection, Target};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
+use fmi_abi::client::Rejection;
 use fmi_abi::{Interface, Value};
-use fmi_client::Rejection;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved {
     generation: u64,
-    state: fmi_client::Saved,
+    state: fmi_abi::client::Saved,
 }
 
 /// Instances of the components. A single instance is stored inline, because with thousands of instances each indirection costs time.
@@ -301,7 +301,7 @@ impl SystemInstance {
     }
 
     /// Returns the index of a state. Fails if other instances have saved it.
-    fn own(&self, saved: Saved) -> Result<fmi_client::Saved, Rejection> {
+    fn own(&self, saved: Saved) -> Result<fmi_abi::client::Saved, Rejection> {
         if saved.generation == self.generation {
             return Ok(saved.state);
         }
@@ -380,7 +380,7 @@ impl SystemInstance {
     /// error no state is stored.
     fn keep(
         &mut self,
-        mut state: impl FnMut(usize, &mut Instance) -> Result<fmi_client::Saved, Rejection>,
+        mut state: impl FnMut(usize, &mut Instance) -> Result<fmi_abi::client::Saved, Rejection>,
     ) -> Result<Saved, Rejection> {
         let mut done = None;
         let kept = self.each(|component, instance| {

@@ -2,8 +2,8 @@
 
 use crate::arrays::Expanded;
 use crate::instance::Instance;
+use fmi_abi::client::Rejection;
 use fmi_abi::{BaseType, Value};
-use fmi_client::Rejection;
 use std::sync::Arc;
 
 impl Instance {

@@ -8,7 +8,7 @@ use crate::selection::Target;
 use crate::start::exact;
 use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 
 /// An input with its values for all runs. Each value holds until the next one.
 pub(super) struct Input {

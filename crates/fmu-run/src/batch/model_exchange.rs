@@ -5,7 +5,7 @@ use super::model_exchange_plan::ModelExchangePlan;
 use super::worker::{Kept, Stopped, Worker};
 use crate::continuous::{Hooks, Model, Simulation, Solver};
 use crate::system_instance::SystemInstance;
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 
 impl<'a> Worker<'a> {
     /// Runs an instance in Model Exchange from the start values to the last time. `follow` is its counterpart in Co-Simulation.

@@ -11,7 +11,7 @@ use crate::messages::{Feed, Logging};
 use crate::system::System;
 use crate::system_instance::SystemInstance;
 use fmi_abi::Value;
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 use std::sync::Arc;
 use std::time;
 

@@ -6,7 +6,7 @@ use super::inputs::Break;
 use super::model::Model;
 use super::{Integration, Solver};
 use crate::system_instance::SystemInstance;
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 
 /// Functions of the caller that are called during a run.
 pub(crate) trait Hooks {

@@ -4,7 +4,7 @@ use super::Solver;
 use super::model::Model;
 use super::simulation::{Arrival, Hooks, Settings, Simulation};
 use super::stepping::Stepping;
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 use ivp::methods::{BDF, DOP853, DOPRI5, IntegrationResult, RK4, Tolerance};
 use ivp::status::Status;
 

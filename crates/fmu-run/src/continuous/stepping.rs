@@ -2,7 +2,7 @@
 
 use super::model::Model;
 use super::simulation::{Arrival, Hooks, Simulation};
-use fmi_client::Rejection;
+use fmi_abi::client::Rejection;
 use ivp::dense::StepInterpolant;
 use ivp::solout::{ControlFlag, SolOut};
 

@@ -5,7 +5,7 @@ use crate::error::{Error, caught};
 use crate::instance::Instance;
 use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
-use fmi_client::{Event, Rejection};
+use fmi_abi::client::{Event, Rejection};
 
 #[derive(Debug)]
 /// An instance with its state.

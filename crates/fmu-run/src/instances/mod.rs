@@ -20,7 +20,7 @@ use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
 use entry::{Entry, Progress, each, empty, in_parts, rows};
 use fmi_abi::Interface;
-use fmi_client::{Event, Rejection};
+use fmi_abi::client::{Event, Rejection};
 use std::sync::Arc;
 
 /// Settings for new instances.

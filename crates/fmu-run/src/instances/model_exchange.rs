@@ -4,7 +4,7 @@ use super::entry::rows;
 use super::{Instances, Mask};
 use crate::error::{Error, request};
 use crate::selection::Selection;
-use fmi_client::Continuous;
+use fmi_abi::client::Continuous;
 
 impl Instances {
     /// Sets the time, s, in Model Exchange: one time for all instances, or a time for each.

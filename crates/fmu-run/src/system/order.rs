@@ -6,8 +6,8 @@ use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
 use crate::selection::Selection;
+use fmi_abi::client::Rejection;
 use fmi_abi::shown;
-use fmi_client::Rejection;
 use std::collections::HashMap;
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
 //! The shared library of an FMU. It stays loaded as long as an instance uses it.
 
-use crate::float::keeping_environment;
-use fmi_abi::c_types::c_void;
-use fmi_abi::{Standard, fmi2, fmi3};
+use super::float::keeping_environment;
+use crate::c_types::c_void;
+use crate::{Standard, fmi2, fmi3};
 use std::path::Path;
 
 /// Functions of an FMU, with the library that contains them.

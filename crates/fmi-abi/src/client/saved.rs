@@ -1,7 +1,7 @@
 //! The handles of saved states. Callers get indices instead of handles, so that they cannot pass a pointer that the FMU did not
 //! return.
 
-use fmi_abi::c_types::c_void;
+use crate::c_types::c_void;
 use std::ptr::null_mut;
 
 /// Index of a state that an instance has saved.
@@ -9,7 +9,7 @@ use std::ptr::null_mut;
 pub struct Saved(usize);
 
 impl Saved {
-    /// Returns the index. It is reused after [`Instance::forget`](crate::Instance::forget).
+    /// Returns the index. It is reused after [`Instance::forget`](super::Instance::forget).
     pub fn index(self) -> usize {
         self.0
     }

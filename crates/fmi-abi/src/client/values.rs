@@ -3,11 +3,11 @@
 //! `set_numbers` and `get_numbers` pass all numeric types as `f64`, which is fast to copy. `set_values` and `get_values` pass
 //! [`Value`]s, which hold every type exactly. An array variable of FMI 3.0 has several values.
 
-use crate::instance::{Instance, call};
-use crate::library::Functions;
-use crate::rejection::Rejection;
-use fmi_abi::c_types::{c_char, c_int};
-use fmi_abi::{BaseType, Standard, Value};
+use super::instance::{Instance, call};
+use super::library::Functions;
+use super::rejection::Rejection;
+use crate::c_types::{c_char, c_int};
+use crate::{BaseType, Standard, Value};
 use std::ffi::{CStr, CString};
 use std::ptr::null;
 

@@ -1,10 +1,10 @@
 //! Saves, restores and serializes the state of an instance.
 
-use crate::instance::{Instance, call};
-use crate::library::Functions;
-use crate::rejection::Rejection;
-use crate::saved::Saved;
-use fmi_abi::c_types::{c_int, c_void};
+use super::instance::{Instance, call};
+use super::library::Functions;
+use super::rejection::Rejection;
+use super::saved::Saved;
+use crate::c_types::{c_int, c_void};
 use std::alloc::{Layout, alloc_zeroed};
 use std::ptr::null_mut;
 

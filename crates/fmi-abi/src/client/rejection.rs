@@ -1,6 +1,6 @@
 //! Errors of an instance, with the messages of its FMU.
 
-use fmi_abi::{Status, shown_to};
+use crate::{Status, shown_to};
 
 /// Maximum number of characters of an FMU's message in an error.
 const LONGEST: usize = 500;

@@ -4,11 +4,11 @@
 //! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
 //! dereferenced.
 
-use crate::rejection::Message;
-use fmi_abi::c_types::{c_char, c_int, c_void};
-use fmi_abi::fmi2::types::*;
-use fmi_abi::fmi3::types::*;
-use fmi_abi::{BaseType, Status};
+use super::rejection::Message;
+use crate::c_types::{c_char, c_int, c_void};
+use crate::fmi2::types::*;
+use crate::fmi3::types::*;
+use crate::{BaseType, Status};
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::CStr;
 use std::fmt;
@@ -18,7 +18,7 @@ use std::thread::ThreadId;
 
 /// Receiver of log messages, called while the FMU logs, also from threads of the FMU. It must not call the FMU and must not panic.
 pub trait LogListener: Send + Sync {
-    /// Receives a message of the instance with this [`number`](crate::Settings::listener); `None` if several instances are alive and
+    /// Receives a message of the instance with this [`number`](super::Settings::listener); `None` if several instances are alive and
     /// the FMU names none of them.
     fn on_message(&self, number: Option<usize>, message: &Message);
 }
@@ -243,7 +243,7 @@ unsafe extern "C" fn log_of_fmi2(
 ) {
     // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
     let [category, format] = [category, message].map(|text| unsafe { string(text) });
-    let arguments = crate::format::Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
+    let arguments = super::format::Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
     let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
     store(environment.addr(), message, true);
 }

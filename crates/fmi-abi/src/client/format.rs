@@ -218,6 +218,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "Miri has neither snprintf nor the file of the memory")]
     fn numbers_are_as_in_c() {
         let minus = -3_i32 as u32 as usize;
         assert_eq!(
@@ -236,6 +237,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
+    #[cfg_attr(miri, ignore = "Miri has neither snprintf nor the file of the memory")]
     fn strings_are_read_if_they_exist() {
         let tank = c"tank".as_ptr().addr();
         assert_eq!(expand("%s|%6s|%-6s|%.2s", &[tank; 4], &[]), "tank|  tank|tank  |ta");
@@ -248,6 +250,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "Miri has neither snprintf nor the file of the memory")]
     fn text_that_is_no_format_stays() {
         for text in [
             "",

@@ -1,15 +1,15 @@
 //! The life cycle, steps, events and derivatives of an instance, for both FMI versions. Safe functions wrap the C
 //! calls: they check lengths, keep the library loaded, and do not call the instance after a fatal error.
 
-use crate::float::keeping_environment;
-use crate::library::{Functions, Library};
-use crate::log::{Log, LogListener, VariableNames, callbacks, log_of_fmi3};
-use crate::rejection::{Message, Rejection};
-use crate::saved::States;
-use fmi_abi::c_types::{c_int, c_void};
-use fmi_abi::fmi2::types::*;
-use fmi_abi::fmi3::types::*;
-use fmi_abi::{Interface, Standard, Status};
+use super::float::keeping_environment;
+use super::library::{Functions, Library};
+use super::log::{Log, LogListener, VariableNames, callbacks, log_of_fmi3};
+use super::rejection::{Message, Rejection};
+use super::saved::States;
+use crate::c_types::{c_int, c_void};
+use crate::fmi2::types::*;
+use crate::fmi3::types::*;
+use crate::{Interface, Standard, Status};
 use std::ffi::{CStr, CString};
 use std::fmt;
 use std::ptr::null;
@@ -145,7 +145,7 @@ macro_rules! call {
                 Functions::Fmi2(of) => (stringify!($fmi2), (of.$fmi2)(handle $(, $of_fmi2)*)),
                 $(Functions::Fmi3(of) => (stringify!($fmi3), (of.$fmi3)(handle $(, $of_fmi3)*)),)?
                 #[allow(unreachable_patterns, reason = "where FMI 3.0 has the function")]
-                Functions::Fmi3(_) => (stringify!($fmi2), fmi_abi::Status::Error as c_int),
+                Functions::Fmi3(_) => (stringify!($fmi2), crate::Status::Error as c_int),
             }
         };
         $self.check(function, code)
@@ -155,7 +155,7 @@ macro_rules! call {
         // SAFETY: as above.
         let code = unsafe {
             match &$self.library.functions {
-                Functions::Fmi2(_) => fmi_abi::Status::Error as c_int,
+                Functions::Fmi2(_) => crate::Status::Error as c_int,
                 Functions::Fmi3(of) => (of.$fmi3)(handle $(, $of_fmi3)*),
             }
         };
@@ -670,7 +670,7 @@ impl Instance {
 /// Waits for the end of an asynchronous step and returns its status. Asks for the status repeatedly, because this crate
 /// passes no `stepFinished` callback (section 4.2.2 of FMI 2.0).
 #[cold]
-fn wait(functions: &fmi_abi::fmi2::Functions, handle: *mut c_void) -> c_int {
+fn wait(functions: &crate::fmi2::Functions, handle: *mut c_void) -> c_int {
     const LONGEST_PAUSE: Duration = Duration::from_millis(1);
     let mut pause = Duration::from_micros(10);
     loop {
