@@ -137,7 +137,6 @@ check-release: $(VENV)/importers.stamp need-rust
 test: need-rust need-python
 	@$(MAKE) --no-print-directory $(call jobs,2) PROGRAMS=target/debug test-crates test-python $(VENV)/importers.stamp \
 	  $(VENV)/examples.stamp test-docs importer-fmus source-fmu
-	$(PY) dev/platforms/bill_of_materials.py --check
 	PROGRAMS=target/debug $(PYTEST) -m 'not long' $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 	$(PYTEST) -m small tests/source_fmu
 
@@ -189,7 +188,6 @@ test-newest-fmpy: $(VENV)/tests.stamp closed-loop-fmus
 FMU_TESTS := $(addprefix tests/,check oracle fmu_run fmpy prw analysis publication scripts)
 
 test-fmu: $(VENV)/tests.stamp closed-loop-fmus
-	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS)
 
 # Browsers with new profiles open the page from a file. tests/fmpy/test_page.py needs no browser.

@@ -1,109 +1,52 @@
-"""Lists the packages that are compiled into the libraries of the FMUs and of fmu-run for Python, with versions and licences.
+"""Lists the packages that are compiled into the libraries of a release, with versions and licences: third-party licences for people,
+and a bill of materials (CycloneDX 1.6) for tools.
 
-    python dev/platforms/bill_of_materials.py            updates the lists
-    python dev/platforms/bill_of_materials.py --check    fails if they are out of date
-
-The FMUs contain the lists in modelDescription/licenses/, the wheels the lists in crates/fmu-run/python/: third-party.txt for
-people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools.
+cargo-cyclonedx writes paths of this machine into its bills and lists packages that are not compiled in. cargo-about replaces the
+copyright notices of libm by a template.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
-import tomllib
 import uuid
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from targets import CONTROLLER, MODEL, ROOT, TARGETS
+from libraries import run
+from targets import CONTROLLER, MODEL, TARGETS
 
-
-@dataclass(frozen=True)
-class Product:
-    """An FMU or a Python package, the Rust package of its libraries, and the directory of its lists."""
-
-    kind: str
-    name: str
-    package: str
-    directory: Path
-
-    @property
-    def bill(self) -> Path:
-        """The list for tools."""
-        return self.directory / "bill-of-materials.cdx.json"
-
-    @property
-    def notice(self) -> Path:
-        """The list for people."""
-        return self.directory / "third-party.txt"
-
-
-LICENCES = Path("modelDescription", "licenses")
-FMU = Product("FMU", MODEL, MODEL, ROOT / LICENCES)
-CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "examples" / "controller" / LICENCES)
-WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
-PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
-
-#: Compiled-in code without a package in Cargo.lock: name, licence, copyright, and the libraries that contain it.
+#: The FMUs and the Python package of a release, each with the Rust package of its libraries.
+PRODUCTS = {MODEL: MODEL, CONTROLLER: CONTROLLER, "fmu_run": "fmu-run-python"}
+#: Compiled-in code that is not a package of cargo: name, licence, copyright, and the libraries that contain it.
 NO_CRATES = (
     ("std", "MIT OR Apache-2.0", "The Rust Project Developers", "all, the Rust standard library"),
     ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux and Windows, from zig"),
     ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code, from zig"),
 )
+LICENCE_FILE = re.compile(r"licen[cs]e|copyright|notice|unlicen[cs]e", re.IGNORECASE)
 
-#: A line of a licence file that names a copyright holder.
-HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?[.,]?\s*(?:\[.*\])?$")
 
-HEADER = """\
-Compiled into the libraries of this {kind}. Where a package offers a choice of licences, the choice is shown.
-Packages are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available under it; the licences
-of the others are at the end.
-Each is a published Rust crate of that name and version. For tools: bill-of-materials.cdx.json.
-
-"""
-
-FOOTER = """
-The file COPYRIGHT-library.html of every Rust distribution lists the third-party parts of the Rust standard library.
-"""
+def write(out: Path, version: str) -> None:
+    """Writes both lists of each product of this version."""
+    for name, package in PRODUCTS.items():
+        (out / f"{name}.cdx.json").write_text(bill(name, package, version), encoding="utf-8")
+        (out / f"{name}-third-party.txt").write_text(notice(package), encoding="utf-8")
 
 
 @cache
-def packages(product: Product) -> list[dict[str, Any]]:
-    """Returns cargo's metadata of the packages that are compiled into a library for any target."""
+def packages(package: str) -> list[dict[str, Any]]:
+    """Returns cargo's metadata of the packages of others that are compiled into a library for any target."""
     names: set[tuple[str, ...]] = set()
     for target in TARGETS:
         # Build scripts and procedural macros run, but are not compiled in.
-        command = ["cargo", "tree", "--locked", "--no-default-features", "--package", product.package]
+        command = ["cargo", "tree", "--locked", "--no-default-features", "--package", package]
         command += ["--target", target.triple, "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]
-        names.update(tuple(line.split()[:2]) for line in _cargo(command).splitlines() if line)
-    metadata = json.loads(_cargo(["cargo", "metadata", "--locked", "--format-version", "1"]))
-    found = [p for p in metadata["packages"] if (p["name"], f"v{p['version']}") in names]
+        names.update(tuple(line.split()[:2]) for line in run(*command).splitlines() if line)
+    metadata = json.loads(run("cargo", "metadata", "--locked", "--format-version", "1"))
+    found = [p for p in metadata["packages"] if p["source"] and (p["name"], f"v{p['version']}") in names]
     return sorted(found, key=lambda package: (package["name"], package["version"]))
-
-
-def _cargo(command: list[str]) -> str:
-    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
-    if process.returncode:
-        raise SystemExit(f"error: {' '.join(command)}: {process.stderr.strip()}")
-    return process.stdout
-
-
-def copyright_of(package: dict[str, Any]) -> str:
-    """Returns the copyright holders in the package's licence files, or its authors if there are none."""
-    lines: dict[str, None] = {}
-    for path in sorted(Path(package["manifest_path"]).parent.iterdir()):
-        if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
-            named = map(HOLDER.match, path.read_text(encoding="utf-8", errors="replace").splitlines())
-            holders = (match[1] for match in named if match)
-            lines |= dict.fromkeys(h for h in holders if "owner" not in h and not re.fullmatch(r"[\d\s-]+", h))
-    authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
-    return "; ".join(lines or authors) or "its authors"
 
 
 def licence_of(package: dict[str, Any]) -> str:
@@ -111,67 +54,39 @@ def licence_of(package: dict[str, Any]) -> str:
     return str(package["license"]).replace("/", " OR ")
 
 
-def bill(product: Product) -> str:
+def bill(name: str, package: str, version: str) -> str:
     """Returns the list for tools."""
-    locked = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
-    sums = {(package["name"], package["version"]): package.get("checksum") for package in locked}
-    components = {}
-    for package in packages(product):
-        name, version = package["name"], package["version"]
-        purl = f"pkg:cargo/{name}@{version}"
-        component = {"type": "library", "bom-ref": purl, "name": name, "version": version}
-        component["licenses"] = [{"expression": licence_of(package)}]
-        if package["source"]:
-            component |= {"copyright": copyright_of(package), "purl": purl}
-            component["hashes"] = [{"alg": "SHA-256", "content": sums[name, version]}]
-        components[name, version] = component
-    (main,) = (key for key in components if key[0] == product.package)
-    metadata = {"component": components.pop(main)}
-    every = list(components.values())
-    for name, licence, holder, location in NO_CRATES:
-        component = {"type": "library", "bom-ref": name, "name": name, "description": location}
-        every.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
-    content = {"metadata": metadata, "components": every}
+    components: list[dict[str, Any]] = []
+    for found in packages(package):
+        purl = f"pkg:cargo/{found['name']}@{found['version']}"
+        component = {"type": "library", "bom-ref": purl, "name": found["name"], "version": found["version"]}
+        components.append(component | {"purl": purl, "licenses": [{"expression": licence_of(found)}]})
+    for other, licence, holder, location in NO_CRATES:
+        component = {"type": "library", "bom-ref": other, "name": other, "description": location}
+        components.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
+    content = {
+        "metadata": {"component": {"type": "library", "name": name, "version": version}},
+        "components": components,
+    }
     # The serial number is a hash of the content, so equal content has an equal serial number.
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
     head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "serialNumber": f"urn:uuid:{serial}", "version": 1}
     return json.dumps({**head, **content}, indent=2, ensure_ascii=False) + "\n"
 
 
-def notice(product: Product) -> str:
-    """Returns the list for people, with the licence files of packages that are not available under the Apache License."""
-    rows, licences = [("package", "version", "licence", "copyright")], []
-    for package in packages(product):
-        if package["source"]:
-            name, version, licence = package["name"], package["version"], licence_of(package)
-            rows.append((name, version, licence, copyright_of(package)))
-            if "Apache-2.0" not in licence:
-                paths = sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*"))
-                licences += [f"\n\n==== {name} {version} ====\n\n{path.read_text(encoding='utf-8')}" for path in paths]
-    others = [("no packages", "licence", "copyright", "in the libraries for"), *NO_CRATES]
-    return "".join([HEADER.format(kind=product.kind), _table(rows), "\n", _table(others), FOOTER, *licences])
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> str:
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths)) for row in rows)
-    return "".join(f"{line.rstrip()}\n" for line in lines)
-
-
-def check(write: bool = False) -> None:
-    """Exits with an error if a list is out of date; with `write`, writes the list instead."""
-    for product in PRODUCTS:
-        for path, content in ((product.bill, bill(product)), (product.notice, notice(product))):
-            if path.is_file() and path.read_text("utf-8") == content:
-                continue
-            name = path.relative_to(ROOT).as_posix()
-            if not write:
-                raise SystemExit(f"error: {name} is out of date; run python3 dev/platforms/bill_of_materials.py")
-            path.write_bytes(content.encode())
-            print(f"{name} written")
-
-
-if __name__ == "__main__":
-    if sys.argv[1:] not in ([], ["--check"]):
-        raise SystemExit(__doc__)
-    check(write=not sys.argv[1:])
+def notice(package: str) -> str:
+    """Returns the list for people: the packages, and then the text of each licence file with the packages that contain it."""
+    lines = ["Compiled into the libraries, with licences and copyright notices:\n"]
+    texts: dict[str, dict[str, None]] = {}
+    for found in packages(package):
+        title = f"{found['name']} {found['version']}"
+        lines.append(f"* {title}: {licence_of(found)}")
+        for path in sorted(Path(found["manifest_path"]).parent.iterdir()):
+            if LICENCE_FILE.match(path.name) and path.is_file():
+                texts.setdefault(path.read_text(encoding="utf-8").strip(), {})[title] = None
+    lines += [f"* {name}: {licence}, {holder}; {where}" for name, licence, holder, where in NO_CRATES]
+    lines.append(
+        "\nThe file COPYRIGHT-library.html of every Rust distribution lists the third-party parts of the Rust standard library."
+    )
+    lines += [f"\n\n==== {', '.join(titles)} ====\n\n{text}" for text, titles in texts.items()]
+    return "\n".join(lines) + "\n"

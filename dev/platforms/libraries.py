@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -141,14 +142,22 @@ def export_from_object() -> list[str]:
 
 
 def wheel(target: Target, out: Path) -> Path:
-    """Builds the wheel of fmu-run for a target and all Python versions from 3.11 on, in `out`."""
+    """Builds the wheel of fmu-run for a target and all Python versions from 3.11 on, in `out`, which contains the lists of the
+    packages that are compiled into it."""
     command = ["maturin", "build", "--release", *STD, "--target", target.triple, "--out", str(out)]
+    command += ["--sbom-include", str(out / "fmu_run.cdx.json")]
     if not target.macos:
         command += ["--zig"]
     if "linux" in target.triple:
         command += ["--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
     flags = export_from_object() if target is WINDOWS else link(target, "fmu_run._native.abi3.so", [])
-    run(*command, *flags, environment=environment(target), directory=PACKAGE)
+    # pyproject.toml includes all files with such a name.
+    licences = PACKAGE / "LICENSE-third-party.txt"
+    try:
+        shutil.copyfile(out / "fmu_run-third-party.txt", licences)
+        run(*command, *flags, environment=environment(target), directory=PACKAGE)
+    finally:
+        licences.unlink(missing_ok=True)
     (path,) = out.glob(f"fmu_run-*{target.wheel}*.whl")
     return path
 

@@ -1,5 +1,5 @@
 """Builds the files of a release, and then replaces dist/ by them: FMUs for all platforms and as C sources, the closed
-loop, reference experiments, wheels, bills of materials, release notes, and the checksums of all of them.
+loop, reference experiments, wheels, third-party licences, bills of materials, release notes, and the checksums of all of them.
 
     python dev/platforms/release.py              builds dist/
     python dev/platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog
@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -41,7 +40,6 @@ def main() -> None:
     # The checks that take no time come first.
     select_rust()
     prw_wheel.check_version(version)
-    bill_of_materials.check()
     compilers = [
         f"{command[0]}: {libraries.run(*command, environment=libraries.environment())}\n" for command in VERSIONS
     ]
@@ -51,10 +49,9 @@ def main() -> None:
         out, scratch = Path(made, "dist"), Path(made, "scratch")
         out.mkdir()
         scratch.mkdir()
+        bill_of_materials.write(out, version)
         fmus.make(libraries.compile_all(out), out, scratch)
         prw_wheel.build(out / f"{MODEL}.fmu", out)
-        for product in bill_of_materials.PRODUCTS:
-            shutil.copyfile(product.bill, out / f"{product.name}.cdx.json")
         (out / "RELEASE_NOTES.md").write_text(notes, encoding="utf-8")
         (out / "compilers.txt").write_text("".join(compilers), encoding="utf-8")
         (out / SUMS).write_text(checksums(out), encoding="utf-8")

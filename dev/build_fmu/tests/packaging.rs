@@ -348,42 +348,39 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
         read("modelDescription.xml") == described,
         "the description in the FMU differs from the description of the sources"
     );
-    for name in ["license.txt", "third-party.txt", "LICENSE-APACHE", "LICENSE-MIT"] {
+    for name in ["license.txt", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(!read(&format!("documentation/licenses/{name}")).is_empty(), "{name}");
     }
 }
 
-/// third-party.txt lists exactly the packages that are compiled into the library of the FMU.
+/// The licences in the FMUs name exactly the packages that are compiled into their libraries.
 #[test]
 fn the_licenses_of_all_packages_are_listed() {
-    let cargo = env!("CARGO");
-    let arguments = [
-        "tree",
-        "--locked",
-        "--package",
-        "prw_testbed",
-        "--no-default-features",
-        "--edges",
-        "normal,no-proc-macro",
+    let licenses = [
+        ("prw_testbed", include_str!("../../../modelDescription/licenses/license.txt")),
+        (
+            "prw_controller",
+            include_str!("../../../examples/controller/modelDescription/licenses/license.txt"),
+        ),
     ];
-    let output = Command::new(cargo)
-        .args(arguments)
-        .args(["--prefix", "none", "--format", "{p}"])
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{output:?}");
-    let tree = String::from_utf8(output.stdout).unwrap();
-    // Parentheses mark a package of this project, by its path, or a package that was listed before.
-    let compiled: BTreeSet<&str> =
-        tree.lines().filter(|line| !line.contains('(')).filter_map(|line| line.split(' ').next()).collect();
-    let list = include_str!("../../../modelDescription/licenses/third-party.txt");
-    let named: BTreeSet<&str> = list
-        .lines()
-        .skip_while(|line| !line.starts_with("package"))
-        .skip(1)
-        .take_while(|line| !line.is_empty())
-        .filter_map(|line| line.split(' ').next())
-        .collect();
-    assert_eq!(compiled, named, "modelDescription/licenses/third-party.txt is out of date");
+    for (package, license) in licenses {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "--locked", "--package", package, "--no-default-features", "--edges"])
+            .args(["normal,no-proc-macro", "--prefix", "none", "--format", "{p}"])
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let tree = String::from_utf8(output.stdout).unwrap();
+        // Parentheses mark a package of this project, by its path, or a package that was listed before.
+        let compiled: BTreeSet<&str> = tree
+            .lines()
+            .filter(|line| !line.contains('('))
+            .filter_map(|line| line.split(' ').next())
+            .collect();
+        // A comma follows the names of code that is not a package of cargo.
+        let items = license.lines().filter_map(|line| line.strip_prefix("  * "));
+        let named: BTreeSet<&str> = items.filter(|name| !name.contains(',')).collect();
+        assert_eq!(compiled, named, "modelDescription/licenses/license.txt of {package} is out of date");
+    }
 }
