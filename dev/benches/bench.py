@@ -28,8 +28,8 @@ import numpy as np
 from fmpy.simulation import instantiate_fmu
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "dev"), str(ROOT / "tests" / "fmu_run")]
-from faulty_fmu import build  # noqa: E402
+sys.path[:0] = [str(ROOT / "dev"), str(ROOT / "tests")]
+from c_models import pack  # noqa: E402
 
 from tools.validation import masters  # noqa: E402
 from tools.validation.system import read  # noqa: E402
@@ -231,7 +231,7 @@ def many_runs() -> None:
     motors = {"theta1": wave, "theta2": -wave}
     wrist = {"pitch_ref": 3 * wave, "roll_ref": -2 * wave, "pitch": 2 * wave, "roll": -wave}
     with tempfile.TemporaryDirectory() as directory:
-        ramp = build(Path(directory), "-DCOMPLETE")
+        ramp = pack(Path(directory) / "ramp.fmu", "integrator", "misbehaving2", {"{misbehaving}": "{ramp}"})
         cases = (
             Case("testbed", FMUS / "prw_testbed.fmu", motors, ["tau1", "pitch", "roll", "roll_rate"], RUNS),
             Case("controller", FMUS / "prw_controller.fmu", wrist, ["theta1", "theta2", "omega1", "omega2"], RUNS),

@@ -3,7 +3,7 @@
     python dev/tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
 
 The lists are in tests/faults. The faults go into a copy of the sources in target/faults. Run all lists before and after
-tests are deleted or merged. The faults of fmu-check's tests are in crates/fmu-check/tests/mutants and run with `make test`.
+tests are deleted or merged. The faults of fmu-check's tests are in crates/fmu-test-kit/models and run with `make test`.
 The exit status is 1 if a fault escaped, or if the tests fail without a fault.
 """
 

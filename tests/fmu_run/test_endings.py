@@ -7,11 +7,11 @@ import time as clock
 import fmu_run
 import numpy as np
 import pytest
-from faulty_fmu import repacked
+from c_models import repacked
 
 TIME = np.arange(11) / 10
 
-# Expected number of rows (of 11), error and note. The position in the table is the value of `behaviour`.
+# Expected number of rows (of 11), error and note. The position in the first table is the value of `behaviour`.
 BEHAVIOURS = {
     "good": (11, None, None),
     "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
@@ -30,22 +30,22 @@ BEHAVIOURS = {
 }
 BEHAVIOURS_FMI3 = {
     "good": (11, None, None),
-    "ends between": (6, "ended by the FMU at t = 0.525 s", None),
+    "ends between": (6, "ended by the FMU at t = 0.525 s: the tank is empty", None),
     "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
     "returns early": (6, "at 0.5 s: fmi3DoStep: the step ended early, at 0.525 s", None),
     "no terminate": (11, None, "finished; then fmi3Terminate returned Fatal without a message"),
     "error if logging": (6, "at 0.5 s: fmi3DoStep: the pump ran dry", None),
 }
+# After the behaviours of FMI 2.0 comes one that is slow with logging, and then those of FMI 3.0.
+NUMBERS = {name: number for number, name in enumerate(BEHAVIOURS)} | {"returns early": len(BEHAVIOURS) + 1}
 
 
 @pytest.mark.parametrize(
-    "behaviours, fixture, first",
-    [(BEHAVIOURS, "faulty_fmu", 4.0), (BEHAVIOURS_FMI3, "faulty_fmu3", 0.0)],
-    ids=["fmi2", "fmi3"],
+    "behaviours, fixture", [(BEHAVIOURS, "faulty_fmu"), (BEHAVIOURS_FMI3, "faulty_fmu3")], ids=["fmi2", "fmi3"]
 )
 @pytest.mark.parametrize("read_before_set", [False, True])
-def test_behaviours(request, behaviours, fixture, first, read_before_set):
-    number = np.repeat(np.arange(len(behaviours)), 3)
+def test_behaviours(request, behaviours, fixture, read_before_set):
+    number = np.repeat([NUMBERS[name] for name in behaviours], 3)
     with fmu_run.Fmu(request.getfixturevalue(fixture)) as fmu:
         arguments = {"start": {"behaviour": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
         runs = fmu.run(TIME, every=1, measures=["end", "mean"], **arguments)
@@ -54,7 +54,7 @@ def test_behaviours(request, behaviours, fixture, first, read_before_set):
     assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
     assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
     for run, count in rows.items():
-        signal = np.where(np.arange(11) < count, first + TIME, np.nan)
+        signal = np.where(np.arange(11) < count, 4.0 + TIME, np.nan)
         np.testing.assert_allclose(runs["y"][run], signal, atol=1e-15)
         np.testing.assert_allclose(thinned["y"][run], signal[::2], atol=1e-15)
         # If the FMU ends the simulation, statistics include the results until then. The statistics of a failed run are NaN.
@@ -95,13 +95,13 @@ def test_an_fmu_that_is_slow_with_logging(faulty_fmu):
 @pytest.mark.parametrize(
     "guid, why",
     [
-        ("strange", "the guid is of another FMU"),
+        ("unknown", "the guid is of another FMU"),
         ("mute", "the instantiation of FaultyFmu returned NULL without a message"),
     ],
 )
 def test_an_fmu_that_cannot_be_instantiated(tmp_path, faulty_fmu, guid, why):
     def change(name, content):
-        return content.replace(b'guid="{faulty_fmu}"', f'guid="{{{guid}}}"'.encode())
+        return content.replace(b'guid="{misbehaving}"', f'guid="{{{guid}}}"'.encode())
 
     with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "strange.fmu", change)) as fmu:
         runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])

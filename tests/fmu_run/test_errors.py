@@ -16,7 +16,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
-from faulty_fmu import repacked
+from c_models import repacked
 
 TIME = np.linspace(0.0, 1.0, 11)
 

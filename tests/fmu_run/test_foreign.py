@@ -13,13 +13,19 @@ import sys
 import fmu_run
 import numpy as np
 import pytest
-from foreign import foreign
+from c_models import pack
 
 if platform.machine() != "x86_64" or platform.system() != "Linux":
     pytest.skip("the FMUs are built for Linux on x86_64", allow_module_level=True)
 
 TIME = np.arange(11) / 10
 VERSIONS = ["2.0", "3.0"]
+
+
+def foreign(directory, manner, version="2.0", changes=None):
+    """Packs the FMU with this manner and for this FMI version into the directory, and returns it."""
+    path, description = directory / f"{manner}{version[0]}.fmu", f"integrator{version[0]}"
+    return pack(path, "integrator", description, {"TRAITS": manner, **(changes or {})})
 
 
 @pytest.fixture(params=VERSIONS)

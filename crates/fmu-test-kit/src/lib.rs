@@ -3,6 +3,7 @@
 //! * [`Importer`] owns an instance of an FMU for FMI 2.0: its methods call the C functions, and dropping it frees the instance.
 //!   [`fmi3::Importer`] does the same for FMI 3.0. [`Either`] contains the operations that both share, and assertions.
 //! * [`serialized`] describes the bytes of saved states.
+//! * [`c_models`] compiles and packs test FMUs that are written in C.
 //! * [`c_programs`] compiles and runs C programs that load FMUs.
 //! * [`fault_injection`] is a fault-injecting importer, which makes any calls in any order.
 //! * [`realtime`] checks that code may run in a control loop.
@@ -14,6 +15,7 @@
 // Under Miri, the log callback is variadic as in C; see `fmi2`.
 #![cfg_attr(miri, feature(c_variadic))]
 
+pub mod c_models;
 pub mod c_programs;
 pub mod checks;
 pub mod costs;

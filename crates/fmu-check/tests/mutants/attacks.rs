@@ -33,12 +33,12 @@ fn marked(mark: &str) -> usize {
 /// processes contains the path of `directory` as a mark.
 #[cfg(target_os = "linux")]
 fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
-    let path = fmu(directory, fmi, &library(fmi, ""), |text| text);
+    let path = fmu(directory, fmi, &library(&[]), |text| text);
     let scratch = directory.join("scratch");
     std::fs::create_dir_all(&scratch).expect("a directory");
     let mut command = check(&path);
     command.args(UNLIMITED).args(["--json", "--no-shrink", "--repeat", "0.02"]);
-    command.env("WAGON_FAULT", fault).env("TMPDIR", scratch).env("WAGON_MARK", directory);
+    command.env("FMU_TRAITS", fault).env("TMPDIR", scratch).env("WAGON_MARK", directory);
     command
 }
 

@@ -1,13 +1,14 @@
 //! FMUs without a fault, in which fmu-check must find nothing but notes.
 
 use super::wagon::{fmu, found, library};
+use fmu_test_kit::c_models;
 use std::process::Command;
 use tempfile::TempDir;
 
 /// Asserts that fmu-check finds only these notes in a variant of the wagon, and checks both interface types.
 fn clean(fmi: u32, variant: &str, notes: &[&str]) {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), fmi, &library(fmi, ""), |text| text);
+    let path = fmu(directory.path(), fmi, &library(&[]), |text| text);
     // The unusual behaviour concerns these topics.
     let topics = ["--only", "life_cycle,states,start_values,results,reset"];
     let options = if variant == "none" { &[][..] } else { &topics };
@@ -48,7 +49,7 @@ fn unusual_behaviour_is_accepted() {
 fn any_default_experiment_is_checked() {
     let directory = TempDir::new().expect("a directory");
     for (stop, size) in [("1", "0.3"), ("1", "1"), ("1", "3"), ("0.07", "0.01"), ("1e-9", "1")] {
-        let path = fmu(directory.path(), 2, &library(2, ""), |text| {
+        let path = fmu(directory.path(), 2, &library(&[]), |text| {
             text.replace(
                 r#"stopTime="1" stepSize="0.01""#,
                 &format!(r#"stopTime="{stop}" stepSize="{size}""#),
@@ -66,17 +67,13 @@ fn any_default_experiment_is_checked() {
 #[test]
 fn a_missing_library_of_the_machine_is_not_a_fault() {
     let directory = TempDir::new().expect("a directory");
-    let [fortran, library] =
-        ["libgfortran-of-another.so.5", "wagon.so"].map(|name| directory.path().join(name));
-    let compile = |arguments: &[&str]| {
-        let status = Command::new("cc").args(["-shared", "-fPIC", "-x", "c"]).args(arguments).status();
-        assert!(status.expect("a C compiler").success());
-    };
-    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mutants/wagon.c");
-    let [fortran, output] = [&fortran, &library].map(|path| path.to_str().expect("a path"));
-    compile(&["-Wl,-soname,libgfortran-of-another.so.5", "/dev/null", "-o", fortran]);
-    let link = ["-x", "none", "-Wl,--no-as-needed", fortran, "-lm", "-lpthread", "-o", output];
-    compile(&[&[source][..], &link].concat());
+    let fortran = directory.path().join("libgfortran-of-another.so.5");
+    let fortran = fortran.to_str().expect("a path");
+    let empty =
+        ["-shared", "-fPIC", "-Wl,-soname,libgfortran-of-another.so.5", "-xc", "/dev/null", "-o", fortran];
+    assert!(Command::new("cc").args(empty).status().expect("a C compiler").success());
+    let library = directory.path().join("wagon.so");
+    c_models::compile("wagon", &["-Wl,--no-as-needed", fortran], &library);
     let path = fmu(directory.path(), 2, &library, |text| text);
     let (found, report) = found(&path, "none", &["--only", "functions,life_cycle"]);
     assert_eq!(found, [], "{report:#}");

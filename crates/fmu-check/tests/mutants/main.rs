@@ -6,12 +6,13 @@
 mod attacks;
 mod correct;
 mod dynamics;
-mod packing;
 mod reports;
 mod valve;
 mod wagon;
 
 use attacks::ATTACKS;
+use fmu_test_kit::c_models;
+use std::collections::BTreeSet;
 use std::path::Path;
 use tempfile::TempDir;
 use wagon::{fmu, found, library, not_shown_without_fault};
@@ -19,13 +20,13 @@ use wagon::{fmu, found, library, not_shown_without_fault};
 /// Asserts that a fault of the library, of its linking or of the description is found under this name, and that the calls of the
 /// finding show it again. They must not show it in the FMU without the fault, and the report must write repeated calls once.
 fn caught(
-    (fmi, fault, macro_name): (u32, &str, &str),
+    (fmi, fault, flags): (u32, &str, &[&str]),
     topic: &str,
     name: &str,
     change: impl Fn(String) -> String,
 ) {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), fmi, &library(fmi, macro_name), change);
+    let path = fmu(directory.path(), fmi, &library(flags), change);
     let out = directory.path().join("out");
     // A hanging call sequence always runs until the limit, so a short limit saves time.
     let limit = if name.ends_with("hang") { "0.3" } else { "2" };
@@ -34,7 +35,7 @@ fn caught(
     let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
         found.iter().any(|(other, _)| other == name),
-        "{fault}{macro_name} is not found as {name}: {found:?} {}",
+        "{fault} {flags:?} is not found as {name}: {found:?} {}",
         report["unreached"]
     );
     let findings = report["findings"].as_array().expect("a list").iter();
@@ -51,7 +52,7 @@ macro_rules! mutants {
     ($($fmi:literal $mutant:ident $topic:literal $name:literal;)+) => { $(
         #[test]
         fn $mutant() {
-            caught(($fmi, stringify!($mutant), ""), $topic, $name, |text| text);
+            caught(($fmi, stringify!($mutant), &[]), $topic, $name, |text| text);
         }
     )+
         /// Names of the faults in this table.
@@ -168,14 +169,14 @@ mutants! {
 
 #[test]
 fn function_missing() {
-    caught((2, "none", "WITHOUT_NOMINALS"), "functions", "functions.missing", |text| text);
+    caught((2, "none", &["-DWITHOUT_NOMINALS"]), "functions", "functions.missing", |text| text);
 }
 
 /// The linkers of other platforms reject the library.
 #[cfg(target_os = "linux")]
 #[test]
 fn symbol_missing() {
-    caught((2, "none", "SYMBOL_MISSING"), "functions", "package.symbols", |text| text);
+    caught((2, "none", &["-DSYMBOL_MISSING"]), "functions", "package.symbols", |text| text);
 }
 
 /// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
@@ -209,38 +210,57 @@ const DESCRIPTIONS: [(u32, &str, &str, &str); 22] = [
 fn descriptions() {
     for (fmi, name, before, after) in DESCRIPTIONS {
         let (topic, _) = name.split_once('.').expect("a topic");
-        caught((fmi, "none", ""), topic, name, |text| {
+        caught((fmi, "none", &[]), topic, name, |text| {
             assert!(text.contains(before), "{before}");
             text.replacen(before, after, 1)
         });
     }
 }
 
-/// Asserts that every fault in the source is tested, and that the pages state the number of faults.
+/// Asserts that every fault in the sources is tested, and that the pages state the numbers of faults.
 #[test]
 fn no_fault_is_forgotten() {
-    let read = |path: &str| {
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("a file")
+    // Traits of FMUs that only the tests of fmu-run use.
+    const OF_RUNNERS: [&str; 7] = [
+        "freed_environment",
+        "memory",
+        "null_environment",
+        "other_environment",
+        "other_thread",
+        "unchecked_memory",
+        "warning",
+    ];
+    let sources = ["frame.h", "wagon.c", "valve.c", "spring.c"].map(c_models::read).concat();
+    let faults = sources.split("IS(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
+    let mut faults: BTreeSet<&str> = faults.filter(|name| !OF_RUNNERS.contains(name)).collect();
+    assert!(faults.remove("name") && faults.remove("unusual"));
+    let mut of_wagon: Vec<_> = FAULTS.iter().chain(ATTACKS.iter().map(|(_, name, _)| name)).collect();
+    of_wagon.push(&"make_hangs");
+    for name in &of_wagon {
+        assert!(faults.remove(**name), "there is no {name}");
+    }
+    faults.retain(|name| !include_str!("valve.rs").contains(name));
+    let (variants, of_spring): (Vec<&str>, Vec<&str>) =
+        faults.into_iter().partition(|name| name.starts_with("harmless_"));
+    for name in variants.iter().chain(&of_spring) {
+        assert!(include_str!("dynamics.rs").contains(name), "{name}");
+    }
+    let of_library = of_wagon.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len();
+    let count = |library| {
+        let descriptions = DESCRIPTIONS.len();
+        format!(
+            "{of_library} faults into {library}, one at a time, and {descriptions} more into its description"
+        )
     };
-    let source = read("tests/mutants/wagon.c");
-    let faults = source.split("IS(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
-    let mut faults: Vec<&str> = faults.filter(|name| !["name", "unusual"].contains(name)).collect();
-    let mut tested = FAULTS.to_vec();
-    tested.extend(ATTACKS.iter().map(|(_, name, _)| *name));
-    tested.push("make_hangs");
-    faults.sort_unstable();
-    faults.dedup();
-    tested.sort_unstable();
-    assert_eq!(faults, tested);
-    let of_library = tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len();
-    for (path, library) in
-        [("../../docs/checking.md", "its library"), ("README.md", "the library of a correct FMU")]
-    {
-        let page = read(path).split_whitespace().collect::<Vec<_>>().join(" ");
-        let count = format!(
-            "{of_library} faults into {library}, one at a time, and {} more into its description",
-            DESCRIPTIONS.len()
-        );
+    let in_time =
+        format!("{} faults in its behaviour in time, and {} variants", of_spring.len(), variants.len());
+    for (path, count) in [
+        ("../../docs/checking.md", count("its library")),
+        ("../../docs/checking.md", in_time),
+        ("README.md", count("the library of a correct FMU")),
+    ] {
+        let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("a page");
+        let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(page.contains(&count), "{path}: {count}");
     }
 }

@@ -25,7 +25,7 @@ fn nothing_passes_unchecked() {
     ];
     for (fmi, change, names, why) in cases {
         let directory = TempDir::new().expect("a directory");
-        let path = fmu(directory.path(), fmi, &library(fmi, ""), change);
+        let path = fmu(directory.path(), fmi, &library(&[]), change);
         let out = directory.path().join("out");
         let run = |options: &[&str]| {
             check(&path)
@@ -54,7 +54,7 @@ fn nothing_passes_unchecked() {
     }
     // A hang is a violation, after which the interface type is not checked.
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text);
     let (found, report) = found(&path, "make_hangs", &["--only", "states", "--no-shrink", "--limit", "0.3"]);
     assert!(found.iter().any(|(name, _)| name == "life_cycle.hang"), "{found:?}");
     assert_eq!(report["findings"][0]["severity"], "violation");
@@ -68,13 +68,13 @@ fn nothing_passes_unchecked() {
 #[test]
 fn a_baseline_accepts_with_a_reason() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text);
     let (baseline, out) = (directory.path().join("baseline.txt"), directory.path().join("out"));
     for (line, status) in [("start_values.start: known", 0), ("start_values.start \"mass\": known", 1)] {
         std::fs::write(&baseline, line).expect("a file");
         let mut command = check(&path);
         command.args(UNLIMITED).args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
-        let output = command.arg("--out").arg(&out).env("WAGON_FAULT", "start_value").output().expect("runs");
+        let output = command.arg("--out").arg(&out).env("FMU_TRAITS", "start_value").output().expect("runs");
         assert_eq!(output.status.code(), Some(status), "{line}: {output:?}");
         let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
         assert_eq!(read("junit.xml").contains("<failure"), status == 1, "{line}");
@@ -96,7 +96,7 @@ fn a_baseline_accepts_with_a_reason() {
 #[test]
 fn a_quick_check_is_quick() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text);
     let (_, report) = found(&path, "none", &["--quick"]);
     let executed = report["sequences"].as_u64().expect("a number");
     assert!(executed <= 400, "{executed} call sequences");
@@ -115,7 +115,7 @@ fn a_quick_check_is_quick() {
 #[test]
 fn many_variables_take_little_time_and_memory() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| {
+    let path = fmu(directory.path(), 2, &library(&[]), |text| {
         let alias = |index| {
             let name = format!("name=\"y{index}\" valueReference=\"9\" variability=\"continuous\"");
             format!("<ScalarVariable {name}><Real/></ScalarVariable>\n")
@@ -145,7 +145,7 @@ fn many_variables_take_little_time_and_memory() {
 #[test]
 fn unpacking_has_a_limit() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text + &" ".repeat(3 << 20));
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text + &" ".repeat(3 << 20));
     let run = |megabytes: &str| {
         check(&path).args(["--only", "description", "--unpacked", megabytes]).output().expect("runs")
     };
@@ -162,7 +162,7 @@ fn unpacking_has_a_limit() {
 fn drafts_are_not_checked() {
     let directory = TempDir::new().expect("a directory");
     let beta = |text: String| text.replace("fmiVersion=\"3.0\"", "fmiVersion=\"3.0-beta.3\"");
-    let path = fmu(directory.path(), 3, &library(3, ""), beta);
+    let path = fmu(directory.path(), 3, &library(&[]), beta);
     let output = check(&path).output().expect("runs");
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(text.contains("3.0-beta.3") && text.contains("a draft of FMI 3.0"), "{text}");
@@ -174,10 +174,10 @@ fn drafts_are_not_checked() {
 #[test]
 fn the_readme_shows_real_output() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text);
     let mut command = check(Path::new(path.file_name().expect("a name")));
     command.args(UNLIMITED).args(["--only", "life_cycle", "--out", "report"]);
-    command.current_dir(&directory).env("WAGON_FAULT", "last_step_rejected");
+    command.current_dir(&directory).env("FMU_TRAITS", "last_step_rejected");
     let output = command.output().expect("runs");
     let output = String::from_utf8_lossy(&output.stdout).into_owned();
     let lines = output.lines().take_while(|line| !line.starts_with("not checked"));
@@ -185,7 +185,7 @@ fn the_readme_shows_real_output() {
     let readme = include_str!("../../README.md");
     assert!(printed.lines().count() == 3 && readme.contains(&printed), "{printed}");
     let mut command = replay(Path::new("report"), "1", &[]);
-    let output = command.current_dir(&directory).env("WAGON_FAULT", "last_step_rejected").output();
+    let output = command.current_dir(&directory).env("FMU_TRAITS", "last_step_rejected").output();
     let printed = String::from_utf8_lossy(&output.expect("runs").stdout).into_owned();
     assert!(printed.contains("The finding shows.") && readme.contains(&printed), "{printed}");
 }
@@ -200,7 +200,7 @@ fn calls_show_it() {
         ("write_past", "start_values", "arrays.written-beyond", 6),
         ("bytes_with_address", "states", "states.fresh-process.crash", 14),
     ] {
-        let path = fmu(directory.path(), 2, &library(2, ""), |text| text);
+        let path = fmu(directory.path(), 2, &library(&[]), |text| text);
         let out = directory.path().join("out");
         let (_, report) = found(&path, mutant, &["--only", topic, "--out", &out.to_string_lossy()]);
         let finding =
@@ -213,7 +213,7 @@ fn calls_show_it() {
         }
         not_shown_without_fault(&out, name, &path, mutant);
         let shown = |options: &[&str]| {
-            let output = replay(&out, name, options).env("WAGON_FAULT", mutant).output().expect("runs");
+            let output = replay(&out, name, options).env("FMU_TRAITS", mutant).output().expect("runs");
             assert_eq!(output.status.code(), Some(1), "{mutant}: {output:?}");
             [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned())
         };
@@ -233,7 +233,7 @@ fn calls_show_it() {
     };
     for (fmi, why) in [(2, "there is no cart"), (3, "is not a call of FMI 3.0")] {
         let other = TempDir::new().expect("a directory");
-        let path = fmu(other.path(), fmi, &library(fmi, ""), elsewhere);
+        let path = fmu(other.path(), fmi, &library(&[]), elsewhere);
         let options = ["--fmu", &path.to_string_lossy()];
         let output = replay(&directory.path().join("out"), "1", &options).output().expect("runs");
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -246,7 +246,7 @@ fn calls_show_it() {
 #[test]
 fn a_replay_states_why_it_is_not_possible() {
     let directory = TempDir::new().expect("a directory");
-    let path = fmu(directory.path(), 2, &library(2, ""), |text| text.replace("UTF-8", "ISO-8859-1"));
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text.replace("UTF-8", "ISO-8859-1"));
     let out = directory.path().join("out");
     found(&path, "none", &["--only", "description", "--out", &out.to_string_lossy()]);
     let report = std::fs::read_to_string(out.join("report.json")).expect("the report");

@@ -1,22 +1,18 @@
 //! Builds the wagon FMU, and runs fmu-check.
 
-use super::packing;
+use fmu_test_kit::c_models;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Returns the model description without a fault.
-fn description(fmi: u32) -> String {
-    if fmi == 2 { include_str!("wagon2.xml") } else { include_str!("wagon3.xml") }.to_owned()
-}
-
-/// Returns the path of the compiled library. The environment variable `WAGON_FAULT` chooses the fault.
-pub fn library(fmi: u32, macro_name: &str) -> PathBuf {
-    packing::library("wagon", fmi, macro_name)
+/// Returns the path of the compiled library. The environment variable `FMU_TRAITS` selects the fault.
+pub fn library(flags: &[&str]) -> PathBuf {
+    c_models::library("wagon", flags)
 }
 
 /// Packs the FMU with a changed description.
 pub fn fmu(directory: &Path, fmi: u32, library: &Path, change: impl Fn(String) -> String) -> PathBuf {
-    packing::pack(directory, ("wagon", fmi), &change(description(fmi)), library, &[])
+    let description = change(c_models::read(&format!("wagon{fmi}.xml")));
+    c_models::pack(directory, ("wagon", fmi), &description, library, &[])
 }
 
 /// Options for a maximum duration that no check reaches, because the machine may be busy.
@@ -33,7 +29,7 @@ pub fn check(fmu: &Path) -> Command {
 pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
     let unlimited = if options.contains(&"--quick") { &[][..] } else { &UNLIMITED };
     let mut command = check(fmu);
-    let output = command.args(options).args(unlimited).arg("--json").env("WAGON_FAULT", fault);
+    let output = command.args(options).args(unlimited).arg("--json").env("FMU_TRAITS", fault);
     let output = output.output().expect("runs");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
@@ -47,7 +43,7 @@ pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)
 /// calls.
 pub fn not_shown_without_fault(out: &Path, name: &str, fmu: &Path, fault: &str) {
     let output = replay(out, name, &["--fmu", &fmu.to_string_lossy()])
-        .env("WAGON_FAULT", "none")
+        .env("FMU_TRAITS", "none")
         .output()
         .expect("runs");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);

@@ -1,25 +1,25 @@
-//! Compiles and packs the FMU of `resets.c`.
+//! Packs the FMU of `integrator.c` with a record of its instances.
 
-use crate::c_fmus::{compiled, open, pack};
-use fmu_run::{Standard, System};
-use std::sync::OnceLock;
+use fmu_run::{Fmu, System};
+use fmu_test_kit::c_models::{library, pack};
 use tempfile::TempDir;
 
 const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Resets" guid="GUID">
-  <CoSimulation modelIdentifier="resets" canHandleVariableCommunicationStepSize="true"/>
+  <CoSimulation modelIdentifier="integrator" canHandleVariableCommunicationStepSize="true"/>
   <ModelVariables>
-    <ScalarVariable name="u" valueReference="0" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="y" valueReference="1" causality="output" variability="continuous"><Real/></ScalarVariable>
-    <ScalarVariable name="factor" valueReference="2" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
-    <ScalarVariable name="bias" valueReference="3" causality="parameter" variability="fixed"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="fails" valueReference="4" causality="parameter" variability="fixed"><Real start="-1"/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="1" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="2" causality="output" variability="continuous"><Real/></ScalarVariable>
+    <ScalarVariable name="factor" valueReference="19" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
+    <ScalarVariable name="bias" valueReference="20" causality="parameter" variability="fixed"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="fails" valueReference="21" causality="parameter" variability="fixed"><Real start="-1"/></ScalarVariable>
+    <ScalarVariable name="hidden" valueReference="22" variability="discrete"><Real/></ScalarVariable>
   </ModelVariables>
   <ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
 </fmiModelDescription>
 "#;
 
-/// The FMU of `resets.c` with one of its manners, and the directory with its record: a file to which the FMU writes when an
+/// The FMU of `integrator.c` with traits, and the directory with its record: a file to which the FMU writes when an
 /// instance is created, reset or freed.
 pub struct Recorded {
     pub fmu: Option<System>,
@@ -27,18 +27,16 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Builds and opens the FMU with this manner and with an attribute that is added to its element CoSimulation.
-    pub fn open(manner: &str, attribute: &str) -> Self {
+    /// Builds and opens the FMU with these traits and with an attribute that is added to its element CoSimulation.
+    pub fn open(traits: &str, attribute: &str) -> Self {
         let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("resets.fmu");
-        let guid = format!("{{{manner}:{}}}", directory.path().join("record").display());
+        let guid = format!("{{{traits}:{}}}", directory.path().join("record").display());
         let xml = DESCRIPTION
             .replace("GUID", &guid)
             .replace("<CoSimulation", &format!("<CoSimulation {attribute}"));
-        static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
-        let library = LIBRARY.get_or_init(|| compiled("batches/resets.c", "cc", &[]));
-        pack(&path, Standard::Fmi2, xml, ("resets", library), &[]);
-        let fmu = open(&path).system().clone();
+        let path = pack(directory.path(), ("integrator", 2), &xml, &library("integrator", &[]), &[]);
+        // SAFETY: the FMU of these tests.
+        let fmu = unsafe { Fmu::open(&path) }.unwrap().system().clone();
         Self { fmu: Some(fmu), directory }
     }
 

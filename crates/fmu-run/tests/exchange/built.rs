@@ -1,8 +1,7 @@
-//! Compiles and packs the FMUs of `models.c`.
+//! Packs the FMUs of `equations.c`.
 
-use crate::c_fmus::{compiled, open, pack};
-use fmu_run::{Standard, System};
-use std::sync::OnceLock;
+use fmu_run::{Fmu, Standard, System};
+use fmu_test_kit::c_models::{library, pack};
 
 /// Returns the numbers of states and of event indicators.
 fn sizes(model: &str) -> (usize, usize) {
@@ -29,7 +28,7 @@ fn description2(model: &str, attributes: &str) -> String {
     let derivatives: String = (0..states).map(|k| format!("<Unknown index=\"{}\"/>", 9 + 2 * k)).collect();
     format!(
         r#"<fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="{{{model}}}" numberOfEventIndicators="{indicators}">
-        <ModelExchange modelIdentifier="models" {attributes}/>
+        <ModelExchange modelIdentifier="equations" {attributes}/>
         <ModelVariables>
         <ScalarVariable name="u" valueReference="1" causality="input" variability="continuous"><Real start="0"/></ScalarVariable>
         <ScalarVariable name="w" valueReference="2" causality="input" variability="continuous"><Real start="0" derivative="1"/></ScalarVariable>
@@ -61,7 +60,7 @@ fn description3(model: &str, attributes: &str) -> String {
     let indicators = "<EventIndicator valueReference=\"8\"/>".repeat(indicators);
     format!(
         r#"<fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="{{{model}}}">
-        <ModelExchange modelIdentifier="models" needsCompletedIntegratorStep="true" {attributes}/>
+        <ModelExchange modelIdentifier="equations" needsCompletedIntegratorStep="true" {attributes}/>
         <ModelVariables>
         <Float64 name="u" valueReference="1" causality="input" start="0"/>
         <Float64 name="w" valueReference="2" causality="input" start="0" derivative="1"/>
@@ -83,11 +82,12 @@ pub fn opened(model: &str, standard: Standard) -> System {
 
 /// Opens a model and adds attributes to its element ModelExchange.
 pub fn opened_with(model: &str, standard: Standard, attributes: &str) -> System {
-    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
-    let library = LIBRARY.get_or_init(|| compiled("exchange/models.c", "cc", &["-Wl,--no-as-needed", "-lm"]));
-    let describe = if standard == Standard::Fmi2 { description2 } else { description3 };
+    let (xml, fmi) = match standard {
+        Standard::Fmi2 => (description2(model, attributes), 2),
+        Standard::Fmi3 => (description3(model, attributes), 3),
+    };
     let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("model.fmu");
-    pack(&path, standard, describe(model, attributes), ("models", library), &[]);
-    open(&path).system().clone()
+    let path = pack(directory.path(), ("equations", fmi), &xml, &library("equations", &[]), &[]);
+    // SAFETY: the FMU of these tests.
+    unsafe { Fmu::open(&path) }.unwrap().system().clone()
 }

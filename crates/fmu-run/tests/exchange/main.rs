@@ -1,10 +1,9 @@
-//! Tests of Model Exchange with models that have known solutions, and with faulty models. `models.c` describes each.
+//! Tests of Model Exchange with models that have known solutions, and with faulty models. `equations.c` of the test kit describes
+//! each.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
-#[path = "../c_fmus/mod.rs"]
-mod c_fmus;
 mod events;
 mod faults;
 mod inputs;

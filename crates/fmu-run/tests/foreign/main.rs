@@ -1,11 +1,9 @@
-//! FMUs that behave like FMUs of other producers. `foreign.c` describes each manner and, for most of them, names tools in which it
+//! FMUs that behave like FMUs of other producers. `integrator.c` of the test kit describes each manner and, for most of them, names tools in which it
 //! was observed.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
-#[path = "../c_fmus/mod.rs"]
-mod c_fmus;
 mod opening;
 mod ssp;
 

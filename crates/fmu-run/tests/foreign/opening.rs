@@ -2,8 +2,8 @@
 
 use crate::built::built;
 use crate::end;
-use fmi_abi::write::zip;
 use fmu_run::{Error, Fmu, Order, Standard, System};
+use fmu_test_kit::c_models::zipped;
 use std::path::Path;
 
 fn opened(path: &Path) -> Result<System, String> {
@@ -24,8 +24,9 @@ fn messages_say_what_a_file_is() {
         path
     };
     let archive = |name: &str, entries: &[(&str, &str)]| {
-        let entries = entries.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
-        file(name, &zip(&entries.collect::<Vec<_>>()).unwrap())
+        let path = directory.path().join(name);
+        zipped(&path, entries.iter().map(|(name, text)| (*name, text.as_bytes())));
+        path
     };
     let xml = |version: &str, rest: &str| {
         format!(
@@ -89,15 +90,13 @@ fn unusual_archives_are_read() {
             .replace("modelName=\"Foreign\"", "modelName=\"For\u{eb}ign\"");
         let latin: Vec<u8> = text.chars().map(|char| u8::try_from(char).unwrap()).collect();
         let platform = if standard == Standard::Fmi2 { "linux64" } else { "x86_64-linux" };
-        let library = std::fs::read(unpacked.join(format!("binaries/{platform}/foreign.so"))).unwrap();
+        let library = std::fs::read(unpacked.join(format!("binaries/{platform}/integrator.so"))).unwrap();
         let platform = if standard == Standard::Fmi2 { platform } else { "x86_64-linux-gnu" };
         let strange = directory.path().join("strange.fmu");
-        let entries = [
-            ("modelDescription.xml".to_owned(), latin),
-            (format!("binaries\\{platform}\\foreign.so"), library),
-            ("resources\\gain.txt".to_owned(), b"1.5".to_vec()),
-        ];
-        std::fs::write(&strange, zip(&entries).unwrap()).unwrap();
+        let binary = format!("binaries\\{platform}\\integrator.so");
+        let entries: [(&str, &[u8]); 3] =
+            [("modelDescription.xml", &latin), (&binary, &library), ("resources\\gain.txt", b"1.5")];
+        zipped(&strange, entries);
         let fmu = opened(&strange).unwrap();
         assert_eq!((end(&fmu), fmu.name()), (Ok(2.5), "For\u{eb}ign"));
     }
@@ -109,19 +108,19 @@ fn unusual_archives_are_read() {
 fn libraries_have_plain_names() {
     for (standard, platform) in [(Standard::Fmi2, "linux64"), (Standard::Fmi3, "x86_64-linux")] {
         let directory = tempfile::tempdir().unwrap();
-        let other = [("modelIdentifier=\"foreign\"", "modelIdentifier=\"2 foreign-models\"")];
+        let other = [("modelIdentifier=\"integrator\"", "modelIdentifier=\"2 test-models\"")];
         let why = opened(&built("plain", standard, directory.path(), &other)).unwrap_err();
-        let expected = format!("(binaries/{platform}/2 foreign-models.so); it has: {platform}/foreign.so");
+        let expected = format!("(binaries/{platform}/2 test-models.so); it has: {platform}/integrator.so");
         assert!(why.ends_with(&expected), "{why}");
         let unpacked = directory.path().join("unpacked");
-        let archive = std::fs::File::open(directory.path().join("plain.fmu")).unwrap();
+        let archive = std::fs::File::open(directory.path().join("integrator.fmu")).unwrap();
         zip::ZipArchive::new(archive).unwrap().extract(&unpacked).unwrap();
         let libraries = unpacked.join("binaries").join(platform);
-        std::fs::rename(libraries.join("foreign.so"), libraries.join("2 foreign-models.so")).unwrap();
+        std::fs::rename(libraries.join("integrator.so"), libraries.join("2 test-models.so")).unwrap();
         assert_eq!(opened(&unpacked).and_then(|fmu| end(&fmu)), Ok(1.0));
-        let outside = [("modelIdentifier=\"foreign\"", "modelIdentifier=\"../foreign\"")];
+        let outside = [("modelIdentifier=\"integrator\"", "modelIdentifier=\"../integrator\"")];
         let why = opened(&built("plain", standard, directory.path(), &outside)).unwrap_err();
-        assert!(why.contains("modelIdentifier \"../foreign\" is not the name of a library"), "{why}");
+        assert!(why.contains("modelIdentifier \"../integrator\" is not the name of a library"), "{why}");
     }
 }
 

@@ -22,7 +22,7 @@ const CHANGES: [(&str, &str); 4] = [
     ),
     (
         "</ModelVariables>",
-        "<ScalarVariable name=\"on\" valueReference=\"19\" causality=\"parameter\" variability=\"tunable\"><Boolean start=\"false\"/></ScalarVariable>\
+        "<ScalarVariable name=\"on\" valueReference=\"25\" causality=\"parameter\" variability=\"tunable\"><Boolean start=\"false\"/></ScalarVariable>\
          </ModelVariables>",
     ),
 ];

@@ -6,8 +6,6 @@
 #[path = "../foreign/built.rs"]
 #[allow(dead_code, reason = "some functions are used by other tests")]
 mod built;
-#[path = "../c_fmus/mod.rs"]
-mod c_fmus;
 mod corpus;
 mod harness;
 
