@@ -24,7 +24,7 @@ TABLE = Path(__file__).with_name("instructions.json")
 #: compiler.
 TOLERANCE = 0.03
 #: Uses in crates/fmu-run/examples/count_runs.rs: the name in the table, the repetitions, and the units (such as steps)
-#: in each. There are many repetitions, because on a busy machine fmu-run may repeat the first runs.
+#: in each.
 RUNS = {
     "load": ("fmu-run: open the FMU", 1, 1),
     "one step": ("fmu-run: a run of one step", 200, 1),

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time as clock
 import warnings
-import zipfile
 from pathlib import Path
 
 import fmpy
@@ -94,45 +93,6 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     angle = np.where(TIME > 0.95, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"], read_before_set=True)
     assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
-
-
-@pytest.mark.parametrize(
-    "content, message",
-    [
-        (None, "cannot be opened"),
-        ({}, "is not an FMU: the zip file has no modelDescription.xml"),
-        ({"modelDescription.xml": "<a"}, "is not well-formed XML"),
-        ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
-        (
-            {"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"/>'},
-            "neither Co-Simulation nor Model Exchange",
-        ),
-        ({"../outside": "x"}, "cannot be unpacked|no readable modelDescription.xml"),
-        ("text", "is not an FMU, which is a zip file"),
-    ],
-)
-def test_files_that_are_not_an_fmu(tmp_path, content, message):
-    path = tmp_path / "some.fmu"
-    if isinstance(content, str):
-        path.write_text(content)
-    elif content is not None:
-        with zipfile.ZipFile(path, "w") as archive:
-            for name, text in content.items():
-                archive.writestr(name, text)
-    with pytest.raises(fmu_run.FmuError, match=message) as raised:
-        fmu_run.Fmu(path)
-    assert str(raised.value).startswith(f"{path}: ")
-    assert not (tmp_path / "outside").exists() and not (tmp_path.parent / "outside").exists()
-
-
-def test_no_library_for_this_platform(tmp_path, testbed):
-    path = tmp_path / "foreign.fmu"
-    with zipfile.ZipFile(testbed) as original, zipfile.ZipFile(path, "w") as archive:
-        for name in original.namelist():
-            moved = re.sub("binaries/[^/]+/", "binaries/vax-vms/", name)
-            archive.writestr(moved, original.read(name))
-    with pytest.raises(fmu_run.FmuError, match="has no library for this platform .*; it has: vax-vms"):
-        fmu_run.Fmu(path)
 
 
 # FMPy contains libraries for other systems. Bytes 18 and 19 of an ELF header, e_machine, select the processor.

@@ -1,14 +1,11 @@
-"""FMUs that behave like FMUs of other producers: their messages, tolerances, values of all types, inputs with their own times, arrays
-and states. The Rust tests of fmu-run test each `manner` separately."""
+"""Messages, tolerances, values of all types, inputs with their own times and arrays, converted between Python and FMUs that behave like FMUs
+of other producers. The Rust tests of fmu-run test each `manner`."""
 
 from __future__ import annotations
 
-import gc
 import logging
 import platform
 import re
-import subprocess
-import sys
 
 import fmu_run
 import numpy as np
@@ -40,22 +37,6 @@ def made(request, tmp_path):
     yield make
     for fmu in opened:
         fmu.close()
-
-
-@pytest.mark.parametrize(
-    "manner",
-    ["memory", "unchecked_memory", "null_environment", "freed_environment", "other_thread", "free", "percent", "libm"],
-)
-def test_manners(made, manner):
-    runs = made(manner).run(TIME, inputs={"u": 1.0}, outputs=["y"], start={"gain": [0.0, 1.0]}).check()
-    np.testing.assert_allclose(runs["y"][:, -1], [1.0, 2.0])
-    del runs
-    gc.collect()
-
-
-def test_the_reason_of_an_fmu_with_another_environment(made):
-    with pytest.raises(fmu_run.FmuError, match=r"^at 0\.5 s: .*the stranger gives up$"):
-        made("other_environment").run(TIME, outputs=["y"]).check()
 
 
 def test_tolerance(made):
@@ -111,12 +92,6 @@ def test_messages_of_an_fmu_that_makes_no_instance(made):
     with pytest.raises(fmu_run.FmuError, match="the stop time is missing"):
         made("stop_time").instances(log=lambda *message: heard.append(message))
     assert heard == [(0, "Error", "error", "the stop time is missing")]
-
-
-def test_values_of_formats(made):
-    heard = []
-    made("format", "2.0").instances(log=lambda *message: heard.append(message[3]))
-    assert heard == ["tank has 7 of 8, 0.500 and 1.0e-09, ab  |%|z"]
 
 
 def test_temperatures_and_their_differences(made):
@@ -239,52 +214,3 @@ def test_structural_parameters(made):
             fmu.run(TIME, start=start, outputs=["sum"])
     with pytest.raises(ValueError, match="size is a structural parameter"):
         model.reset(start={"size": 3})
-
-
-def test_states_after_a_reset(made):
-    model = made("no_reset").instances()
-    before = model.save()
-    model.reset()
-    with pytest.raises(ValueError, match="the state was saved before a reset that made a new instance"):
-        model.restore(before)
-    assert not model.errors
-    later = model.save()
-    del before
-    model.restore(later)
-
-
-@pytest.mark.parametrize("manner", ["huge_state", "endless_state"])
-def test_absurd_sizes_of_states(made, manner):
-    model = made(manner).instances()
-    with pytest.raises(fmu_run.FmuError, match="for which there is not enough memory"):
-        model.serialize(model.save())
-
-
-CRASH = """
-import sys, fmu_run
-for path in sys.argv[1:]:
-    with fmu_run.Fmu(path) as fmu:
-        many = fmu.instances(4, threads=2)
-        for _ in range(3):
-            many.step(0.1)
-        fmu.run([0.0, 0.1, 0.2], start={"gain": [0.0, 1.0, 2.0]}, outputs=["y"])
-        del many
-print("alive")
-"""
-
-
-def test_python_survives(tmp_path):
-    """None of these manners ends the process, not even while instances are freed and the library is unloaded."""
-    manners = [
-        "unchecked_memory",
-        "other_environment",
-        "freed_environment",
-        "thread",
-        "other_thread",
-        "free",
-        "percent",
-        "rounding",
-    ]
-    paths = [foreign(tmp_path, manner, version) for manner in manners for version in VERSIONS]
-    done = subprocess.run([sys.executable, "-c", CRASH, *paths], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, "alive\n"), done.stderr

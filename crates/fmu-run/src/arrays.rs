@@ -19,8 +19,6 @@ const ELEMENT: usize = 160;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Arrays {
     all: Vec<Array>,
-    /// Index in `all` by value reference.
-    by_reference: HashMap<u32, usize>,
     /// Number of the first element of the first array.
     first: u32,
     /// For each element, the index of its array and its number in the array.
@@ -46,7 +44,7 @@ impl Array {
         Self { reference, base, sizes: of.dimensions.clone().unwrap_or_default(), start }
     }
 
-    fn length(&self) -> Option<usize> {
+    pub fn length(&self) -> Option<usize> {
         let length = self.sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
         length.filter(|length| *length <= MAX_ELEMENTS)
     }
@@ -132,7 +130,6 @@ impl Arrays {
         self.elements.try_reserve(length).ok()?;
         self.bytes = bytes;
         let index = self.all.len();
-        self.by_reference.insert(array.reference, index);
         let own = u32::try_from(index).ok()?;
         self.elements.extend((0..length as u32).map(|number| (own, number)));
         self.all.push(array);
@@ -142,11 +139,6 @@ impl Arrays {
     /// Returns the estimated memory of the elements, in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
-    }
-
-    /// Returns the number of values of a variable of the FMU, which is 1 for a scalar.
-    pub fn length(&self, reference: u32) -> usize {
-        self.by_reference.get(&reference).and_then(|index| self.all[*index].length()).unwrap_or(1)
     }
 
     /// Returns the index of the array to which an element belongs, and the number of the element in the array. Returns `None` for a

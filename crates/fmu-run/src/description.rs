@@ -250,15 +250,14 @@ impl Description {
         }
         if let (Some(one), Some(other)) = (&output.unit, &input.unit) {
             match (self.unit_of(output), to.unit_of(input)) {
-                (Some(of_one), Some(of_other)) if of_one != of_other && one == other => {
+                (Some(of_one), Some(of_other)) if of_one == of_other => {}
+                (Some(of_one), Some(of_other)) if one == other => {
                     return Err(format!(
                         "both are in {one}, but the output's is {of_one} and the input's {of_other}"
                     ));
                 }
-                (Some(of_one), Some(of_other)) if of_one == of_other => {}
-                (Some(_), Some(_)) => return Err(format!("the output is in {one}, the input in {other}")),
-                _ if one != other => return Err(format!("the output is in {one}, the input in {other}")),
-                _ => {}
+                (None, _) | (_, None) if one == other => {}
+                _ => return Err(format!("the output is in {one}, the input in {other}")),
             }
         }
         self.check_items(output, to, input)
@@ -294,9 +293,7 @@ impl Description {
             _ => Ok(()),
         }
     }
-}
 
-impl Description {
     /// Returns the definition of the unit of a variable, if there is one.
     pub(crate) fn unit_of(&self, variable: &Variable) -> Option<Unit> {
         let unit = Unit::of(self.units.get(variable.unit.as_deref()?)?)?;

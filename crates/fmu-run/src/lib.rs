@@ -47,6 +47,6 @@ pub use selection::Selection;
 pub use start::Start;
 #[cfg(feature = "write")]
 pub use system::{CheckedStructure, SystemStructure};
-pub use system::{Composition, Elements, Fmu, Order, StartValue, System, Variables, nearest};
+pub use system::{Composition, Elements, Fmu, Order, System, Variables, nearest};
 #[doc(hidden)]
 pub use threads::process;

@@ -162,11 +162,11 @@ impl Selection {
     ) -> Result<(), Rejection> {
         if self.is_direct {
             let Group { component, references, .. } = &self.groups[0];
-            return components[*component].get_numbers(BaseType::Real, references, row);
+            return components[*component].get(BaseType::Real, references, row);
         }
         for Group { component, base, references, indices, changes, .. } in &self.groups {
             buffer.resize(references.len(), 0.0);
-            components[*component].get_numbers(*base, references, buffer)?;
+            components[*component].get(*base, references, buffer)?;
             for (index, [_, out]) in changes {
                 buffer[*index] = out.apply(buffer[*index]);
             }
@@ -202,7 +202,7 @@ impl Selection {
     ) -> Result<(), Rejection> {
         if self.is_direct {
             let Group { component, references, .. } = &self.groups[0];
-            return components[*component].set_numbers(BaseType::Real, references, row);
+            return components[*component].set(BaseType::Real, references, row);
         }
         for Group { component, base, references, indices, changes, .. } in &self.groups {
             buffer.clear();
@@ -210,7 +210,7 @@ impl Selection {
             for (index, [into, _]) in changes {
                 buffer[*index] = into.apply(buffer[*index]);
             }
-            components[*component].set_numbers(*base, references, buffer)?;
+            components[*component].set(*base, references, buffer)?;
         }
         Ok(())
     }

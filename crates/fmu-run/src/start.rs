@@ -3,25 +3,21 @@
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
 use crate::selection::{Target, fits};
-use crate::system::{StartValue, System};
+use crate::system::System;
 use fmi_abi::{BaseType, Value, boolean};
 use std::borrow::Cow;
 
-/// Start value of a variable. A string is the value of a string variable, the name of an item of an enumeration, or `true`, `false`, `1`
-/// or `0` for a Boolean.
+/// Start value of a variable. A [string](Value::String) is the value of a string variable, the name of an item of an enumeration, or
+/// `true`, `false`, `1` or `0` for a Boolean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a> {
     /// One number for all runs or instances; 0 or 1 for a Boolean.
     Same(f64),
     /// A number for each run or instance.
     Each(&'a [f64]),
-    /// One string for all runs or instances.
-    Text(&'a str),
-    /// A string for each run or instance.
-    EachText(&'a [String]),
-    /// One exact value for all runs or instances. It can have any type, for example bytes or a 64-bit integer.
+    /// One value of any type for all runs or instances, for example a string, bytes or a 64-bit integer.
     Value(&'a Value),
-    /// An exact value for each run or instance.
+    /// A value of any type for each run or instance.
     EachValue(&'a [Value]),
 }
 
@@ -29,9 +25,8 @@ impl Start<'_> {
     /// Returns the number of runs or instances for which there are separate values; `None` if one value is for all.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
-            Self::Same(_) | Self::Text(_) | Self::Value(_) => None,
+            Self::Same(_) | Self::Value(_) => None,
             Self::Each(values) => Some(values.len()),
-            Self::EachText(texts) => Some(texts.len()),
             Self::EachValue(values) => Some(values.len()),
         }
     }
@@ -50,11 +45,7 @@ impl<'a> StartValues<'a> {
     pub fn of(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (name, value) in system.start() {
-            let start = match value {
-                StartValue::Number(number) => Start::Same(*number),
-                StartValue::Text(text) => Start::Text(text),
-            };
-            all.put(StartValues::found(system, name, start)?.into_owned());
+            all.put(StartValues::found(system, name, Start::Value(value))?.into_owned());
         }
         all.put(Self::given(system, given)?);
         Ok(all)
@@ -114,8 +105,6 @@ impl<'a> StartValues<'a> {
                 let values = match start {
                     Start::Same(number) => vec![Value::Real(number)],
                     Start::Each(numbers) => numbers.iter().copied().map(Value::Real).collect(),
-                    Start::Text(text) => vec![Value::from(text)],
-                    Start::EachText(texts) => texts.iter().map(|text| Value::from(text.as_str())).collect(),
                     Start::Value(value) => vec![value.clone()],
                     Start::EachValue(values) => values.to_vec(),
                 };
@@ -123,17 +112,10 @@ impl<'a> StartValues<'a> {
                 all.values.push((target, values.collect::<Result<_, _>>()?));
                 continue;
             }
-            let number = |value: &Value| match value {
-                Value::String(text) => number_of(found, name, text),
-                value => number_in(found, name, value),
-            };
+            let number = |value: &Value| number_of(found, name, value);
             let numbers = match start {
                 Start::Same(number) => Cow::Owned(vec![number]),
                 Start::Each(numbers) => Cow::Borrowed(numbers),
-                Start::Text(text) => Cow::Owned(vec![number_of(found, name, text)?]),
-                Start::EachText(texts) => Cow::Owned(
-                    texts.iter().map(|text| number_of(found, name, text)).collect::<Result<_, _>>()?,
-                ),
                 Start::Value(value) => Cow::Owned(vec![number(value)?]),
                 Start::EachValue(values) => Cow::Owned(values.iter().map(number).collect::<Result<_, _>>()?),
             };
@@ -192,44 +174,35 @@ pub(crate) fn exact(found: Found, name: &str, value: Value) -> Result<Value, Err
     Ok(value)
 }
 
-/// Converts an exact value to `f64`, for a variable whose type is a number.
-fn number_in(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
-    found.check_number(name)?;
-    match value {
-        Value::Real(number) => Ok(*number),
-        // A floating-point variable gets the nearest number. For other types, an integer that is rounded here is out of range, so
-        // it is rejected later.
-        Value::Integer(number) => Ok(*number as f64),
-        Value::Boolean(boolean) => Ok(f64::from(u8::from(*boolean))),
-        Value::String(_) | Value::Binary(_) => {
-            request(format!("{name} is {}, its value cannot be bytes", found.variable.kind_in_words()))
-        }
-    }
-}
-
 /// Returns the value with this index, or the only value.
 fn one<T>(values: &[T], of: usize) -> Option<&T> {
     if values.len() == 1 { values.first() } else { values.get(of) }
 }
 
-/// Converts a string to the number of a Boolean or of an item of an enumeration.
-fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
+/// Converts a value to `f64`, for a variable whose type is a number. A string is a Boolean or the name of an item of an enumeration.
+pub(crate) fn number_of(found: Found, name: &str, value: &Value) -> Result<f64, Error> {
+    found.check_number(name)?;
+    let kind = || found.variable.kind_in_words();
+    let text = match value {
+        Value::Real(number) => return Ok(*number),
+        // A floating-point variable gets the nearest number. For other types, an integer that is rounded here is out of range, so
+        // it is rejected later.
+        Value::Integer(number) => return Ok(*number as f64),
+        Value::Boolean(boolean) => return Ok(f64::from(u8::from(*boolean))),
+        Value::Binary(_) => return request(format!("{name} is {}, its value cannot be bytes", kind())),
+        Value::String(text) => text,
+    };
     if found.variable.base == BaseType::Boolean
         && let Some(boolean) = boolean(text)
     {
         return Ok(f64::from(u8::from(boolean)));
     }
-    match found.description.items(found.variable) {
-        Some(items) => {
-            let number =
-                items.iter().find(|(item, _)| item == text).and_then(|(_, number)| number.parse().ok());
-            let known: Vec<_> = items.iter().map(|(item, _)| item.as_str()).collect();
-            let why = || format!("{name} is one of {}, its start value cannot be {text:?}", known.join(", "));
-            number.ok_or_else(|| Error::Request(why()))
-        }
-        None => request(format!(
-            "{name} is {}, its start value cannot be {text:?}",
-            found.variable.kind_in_words()
-        )),
-    }
+    let Some(items) = found.description.items(found.variable) else {
+        return request(format!("{name} is {}, its start value cannot be {text:?}", kind()));
+    };
+    let number = items.iter().find(|(item, _)| item == text).and_then(|(_, number)| number.parse().ok());
+    let known = || items.iter().map(|(item, _)| item.as_str()).collect::<Vec<_>>().join(", ");
+    number.ok_or_else(|| {
+        Error::Request(format!("{name} is one of {}, its start value cannot be {text:?}", known()))
+    })
 }

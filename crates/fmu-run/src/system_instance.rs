@@ -132,8 +132,11 @@ impl SystemInstance {
             .collect();
         self.each(|index, instance| instance.set_up(start_time, stop_time, tolerances[index]))?;
         for (target, value) in start.values(number) {
-            let value = std::slice::from_ref(value);
-            self.components[target.component].set_values(target.base, &[target.reference], value)?;
+            self.components[target.component].set(
+                target.base,
+                &[target.reference],
+                std::slice::from_ref(value),
+            )?;
         }
         let numbers: Vec<_> = start.numbers(number).collect();
         // Successive numbers of one type are set with one call, because an FMU may require that they are consistent, for example
@@ -145,7 +148,7 @@ impl SystemInstance {
             let Target { component, base, .. } = group[0].0;
             let (references, values): (Vec<_>, Vec<_>) =
                 group.iter().map(|(target, value)| (target.reference, *value)).unzip();
-            self.components[component].set_numbers(base, &references, &values)?;
+            self.components[component].set(base, &references, &values)?;
         }
         self.each(|index, instance| {
             instance.enter_initialization_mode(start_time, stop_time, tolerances[index])
@@ -256,25 +259,30 @@ impl SystemInstance {
     #[inline(always)]
     pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Rejection> {
         variables.set(&mut self.components, &mut self.buffer, row)?;
-        let Exchange { order, stages } = self.system.exchange();
-        self.is_due |= *order == Order::Dependencies && !stages.is_empty();
+        self.changed();
         Ok(())
     }
 
     /// Returns the exact value of a variable.
     pub fn get_value(&mut self, of: Target) -> Result<Value, Rejection> {
         self.pass_on()?;
-        let mut values = self.components[of.component].get_values(of.base, &[of.reference])?;
-        values.pop().ok_or_else(|| Rejection::without_fmu("get", "there is no value"))
+        let mut value = Value::Integer(0);
+        self.components[of.component].get(of.base, &[of.reference], std::slice::from_mut(&mut value))?;
+        Ok(value)
     }
 
     /// Sets a variable to an exact value.
     pub fn set_value(&mut self, of: Target, value: &Value) -> Result<(), Rejection> {
-        let value = std::slice::from_ref(value);
-        self.components[of.component].set_values(of.base, &[of.reference], value)?;
+        self.components[of.component].set(of.base, &[of.reference], std::slice::from_ref(value))?;
+        self.changed();
+        Ok(())
+    }
+
+    /// Notes that the connected inputs must be updated, because a variable has been set.
+    #[inline(always)]
+    fn changed(&mut self) {
         let Exchange { order, stages } = self.system.exchange();
         self.is_due |= *order == Order::Dependencies && !stages.is_empty();
-        Ok(())
     }
 
     /// Returns the instance of a single FMU.

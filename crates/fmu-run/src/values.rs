@@ -1,141 +1,130 @@
 //! Reads and sets variables, including array elements. All elements of an array are read or set with one call of the FMU.
 
-use crate::arrays::Expanded;
+use crate::arrays::{Array, ArrayStartValues};
 use crate::instance::Instance;
-use fmi_abi::client::Rejection;
+use fmi_abi::client::{Instance as Client, Rejection};
 use fmi_abi::{BaseType, Value};
-use std::sync::Arc;
+use std::collections::HashMap;
 
-impl Instance {
-    /// Sets numeric variables of one type. Booleans are 0 or 1.
+type Called = Result<(), Rejection>;
+
+/// Type in which values are passed: `f64`, which is fast, with 0 or 1 for a Boolean; or [`Value`], which also represents strings, bytes
+/// and 64-bit integers.
+pub(crate) trait Scalar: Clone {
+    const ZERO: Self;
+
+    fn get(client: &mut Client, base: BaseType, vr: &[u32], values: &mut [Self]) -> Called;
+
+    fn set(client: &mut Client, base: BaseType, vr: &[u32], values: &[Self]) -> Called;
+
+    /// Returns the values of arrays that were set before Initialization Mode.
+    fn set_before(starts: &mut ArrayStartValues) -> &mut HashMap<usize, Vec<Self>>;
+
+    /// Parses a start value.
+    fn read(base: BaseType, start: &str) -> Option<Self>;
+}
+
+impl Scalar for f64 {
+    const ZERO: Self = 0.0;
+
     #[inline]
-    pub(crate) fn set_numbers(
-        &mut self,
-        base: BaseType,
-        vr: &[u32],
-        values: &[f64],
-    ) -> Result<(), Rejection> {
-        assert_eq!(vr.len(), values.len());
-        if self.arrays.among(vr) {
-            return self.set_elements(base, vr, values);
-        }
-        self.client.set_numbers(base, vr, values)
+    fn get(client: &mut Client, base: BaseType, vr: &[u32], values: &mut [Self]) -> Called {
+        client.get_numbers(base, vr, values)
     }
 
-    /// Reads numeric variables of one type. Booleans are 0 or 1.
     #[inline]
-    pub(crate) fn get_numbers(
-        &mut self,
-        base: BaseType,
-        vr: &[u32],
-        values: &mut [f64],
-    ) -> Result<(), Rejection> {
+    fn set(client: &mut Client, base: BaseType, vr: &[u32], values: &[Self]) -> Called {
+        client.set_numbers(base, vr, values)
+    }
+
+    fn set_before(starts: &mut ArrayStartValues) -> &mut HashMap<usize, Vec<Self>> {
+        &mut starts.numbers
+    }
+
+    fn read(_: BaseType, start: &str) -> Option<Self> {
+        if start == "true" { Some(1.0) } else { start.parse().ok() }
+    }
+}
+
+impl Scalar for Value {
+    const ZERO: Self = Self::Integer(0);
+
+    fn get(client: &mut Client, base: BaseType, vr: &[u32], values: &mut [Self]) -> Called {
+        client.get_values(base, vr, values.len()).map(|found| values.clone_from_slice(&found))
+    }
+
+    fn set(client: &mut Client, base: BaseType, vr: &[u32], values: &[Self]) -> Called {
+        client.set_values(base, vr, values)
+    }
+
+    fn set_before(starts: &mut ArrayStartValues) -> &mut HashMap<usize, Vec<Self>> {
+        &mut starts.values
+    }
+
+    fn read(base: BaseType, start: &str) -> Option<Self> {
+        Self::read(base, start)
+    }
+}
+
+impl Instance {
+    /// Reads variables of one type.
+    #[inline]
+    pub(crate) fn get<T: Scalar>(&mut self, base: BaseType, vr: &[u32], values: &mut [T]) -> Called {
         assert_eq!(vr.len(), values.len());
         if self.arrays.among(vr) {
             return self.get_elements(base, vr, values);
         }
-        self.client.get_numbers(base, vr, values)
+        T::get(&mut self.client, base, vr, values)
+    }
+
+    /// Sets variables of one type.
+    #[inline]
+    pub(crate) fn set<T: Scalar>(&mut self, base: BaseType, vr: &[u32], values: &[T]) -> Called {
+        assert_eq!(vr.len(), values.len());
+        if self.arrays.among(vr) {
+            return self.set_elements(base, vr, values);
+        }
+        T::set(&mut self.client, base, vr, values)
     }
 
     #[cold]
-    fn get_elements(&mut self, base: BaseType, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
+    fn get_elements<T: Scalar>(&mut self, base: BaseType, vr: &[u32], values: &mut [T]) -> Called {
         let expanded = self.arrays.expanded(vr);
-        let mut all = vec![0.0; expanded.count];
-        self.client.get_numbers(base, &expanded.references, &mut all)?;
-        expanded.indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
+        let mut all = vec![T::ZERO; expanded.count];
+        T::get(&mut self.client, base, &expanded.references, &mut all)?;
+        expanded.indices.iter().zip(values).for_each(|(index, value)| value.clone_from(&all[*index]));
         Ok(())
     }
 
     /// Sets variables, some of which are array elements. All other elements of the arrays keep their values.
     #[cold]
-    fn set_elements(&mut self, base: BaseType, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
-        let expanded = self.arrays.expanded(vr);
-        let mut all = vec![0.0; expanded.count];
-        if self.array_starts.is_some() {
-            for (array, begin) in &expanded.arrays {
-                let known = self.start_numbers(*array);
-                all[*begin..][..known.len()].copy_from_slice(&known);
+    fn set_elements<T: Scalar>(&mut self, base: BaseType, vr: &[u32], values: &[T]) -> Result<(), Rejection> {
+        let Self { client, arrays, array_starts, .. } = self;
+        let expanded = arrays.expanded(vr);
+        let mut all = vec![T::ZERO; expanded.count];
+        if let Some(starts) = array_starts {
+            for (index, begin) in &expanded.arrays {
+                let array = &arrays.all()[*index];
+                let known = T::set_before(starts).entry(*index).or_insert_with(|| declared(array));
+                all[*begin..][..known.len()].clone_from_slice(known);
             }
         } else if !expanded.is_complete() {
-            self.client.get_numbers(base, &expanded.references, &mut all)?;
-        }
-        expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
-        self.client.set_numbers(base, &expanded.references, &all)?;
-        if let Some(starts) = &mut self.array_starts {
-            for (array, begin) in expanded.arrays {
-                let length = self.arrays.length(self.arrays.all()[array].reference);
-                starts.numbers.insert(array, all[begin..][..length].to_vec());
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the values of an array before Initialization Mode: those that were set, or the start values.
-    fn start_numbers(&self, array: usize) -> Vec<f64> {
-        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.numbers.get(&array)) {
-            return known.clone();
-        }
-        let array = &self.arrays.all()[array];
-        let number = |number| match array.start(number).map(|start| &**start) {
-            Some("true") => 1.0,
-            start => start.and_then(|start| start.parse().ok()).unwrap_or_default(),
-        };
-        (0..self.arrays.length(array.reference)).map(number).collect()
-    }
-
-    /// Sets variables of one type to exact values, i.e. without conversion to `f64`, so that strings, bytes and 64-bit integers are
-    /// possible. All other elements of arrays keep their values.
-    pub(crate) fn set_values(
-        &mut self,
-        base: BaseType,
-        vr: &[u32],
-        values: &[Value],
-    ) -> Result<(), Rejection> {
-        assert_eq!(vr.len(), values.len());
-        if !self.arrays.among(vr) {
-            return self.client.set_values(base, vr, values);
-        }
-        let expanded = self.arrays.expanded(vr);
-        let mut all = vec![Value::Integer(0); expanded.count];
-        if self.array_starts.is_some() {
-            for (array, begin) in &expanded.arrays {
-                let known = self.start_values(*array);
-                all[*begin..][..known.len()].clone_from_slice(&known);
-            }
-        } else if !expanded.is_complete() {
-            all = self.client.get_values(base, &expanded.references, expanded.count)?;
+            T::get(client, base, &expanded.references, &mut all)?;
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index].clone_from(value));
-        self.client.set_values(base, &expanded.references, &all)?;
-        if let Some(starts) = &mut self.array_starts {
-            for (array, begin) in expanded.arrays {
-                let length = self.arrays.length(self.arrays.all()[array].reference);
-                starts.values.insert(array, all[begin..][..length].to_vec());
+        T::set(client, base, &expanded.references, &all)?;
+        if let Some(starts) = array_starts {
+            for (index, begin) in &expanded.arrays {
+                let length = arrays.all()[*index].length().unwrap_or_default();
+                T::set_before(starts).insert(*index, all[*begin..][..length].to_vec());
             }
         }
         Ok(())
     }
+}
 
-    /// Reads exact values of variables of one type.
-    pub(crate) fn get_values(&mut self, base: BaseType, vr: &[u32]) -> Result<Vec<Value>, Rejection> {
-        if !self.arrays.among(vr) {
-            return self.client.get_values(base, vr, vr.len());
-        }
-        let Expanded { references, count, indices, .. } = self.arrays.expanded(vr);
-        let all = self.client.get_values(base, &references, count)?;
-        Ok(indices.iter().map(|index| all[*index].clone()).collect())
-    }
-
-    /// Returns the exact values of an array before Initialization Mode: those that were set, or the start values.
-    fn start_values(&self, array: usize) -> Vec<Value> {
-        if let Some(known) = self.array_starts.as_ref().and_then(|starts| starts.values.get(&array)) {
-            return known.clone();
-        }
-        let arrays = Arc::clone(&self.arrays);
-        let array = &arrays.all()[array];
-        let start = |number| {
-            array.start(number).and_then(|start| Value::read(array.base, start)).unwrap_or(Value::Integer(0))
-        };
-        (0..arrays.length(array.reference)).map(start).collect()
-    }
+/// Returns the start values of an array in the model description.
+fn declared<T: Scalar>(array: &Array) -> Vec<T> {
+    let start = |number| array.start(number).and_then(|start| T::read(array.base, start)).unwrap_or(T::ZERO);
+    (0..array.length().unwrap_or_default()).map(start).collect()
 }

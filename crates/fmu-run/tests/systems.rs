@@ -113,7 +113,10 @@ fn wrong_systems_are_rejected() {
         ),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
-        (|s| s.start.push(("plant.y", "0".into())), "plant.y is output and takes no start value"),
+        (
+            |s| s.start.push(("plant.y", "0".into())),
+            "plant.y is read-only: it is calculated by the FMU and has no start value",
+        ),
         (
             |s| s.start.push(("plant.angle", "-2".into())),
             "the start value of plant.angle must not be below -1, it is -2",
@@ -122,11 +125,14 @@ fn wrong_systems_are_rejected() {
             |s| s.start.push(("plant.count", "10".into())),
             "the start value of plant.count must not be above 9, it is 10",
         ),
-        (|s| s.start.push(("plant.on", "0".into())), "plant.on is Boolean, its start value cannot be '0'"),
-        (|s| s.inputs[0].2 = "far".into(), "law.r is Real, its start value cannot be 'far'"),
+        (
+            |s| s.start.push(("plant.on", "no".into())),
+            "plant.on is a Boolean, its start value cannot be \"no\"",
+        ),
+        (|s| s.inputs[0].2 = "far".into(), "law.r is a number, its start value cannot be \"far\""),
         (
             |s| s.start.push(("plant.gear", "Fast".into())),
-            "plant.gear is Enumeration, its start value cannot be 'Fast'",
+            "plant.gear is one of Neutral, Drive, its start value cannot be \"Fast\"",
         ),
         (
             |s| s.connections.push(("plant.gear_now", "law.other_gear")),
@@ -252,7 +258,8 @@ fn fmus_for_fmi_3_are_connected_too() {
 #[test]
 fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
     let directory = tempfile::tempdir().unwrap();
-    let system = system(directory.path());
+    let mut system = system(directory.path());
+    system.start = vec![("plant.on", "1".into())];
     let out = directory.path().join("osp");
     system.check().unwrap().write_osp(&out).unwrap();
     let text = fs::read_to_string(out.join("OspSystemStructure.xml")).unwrap();
@@ -260,6 +267,7 @@ fn the_directory_for_libcosim_has_the_fmus_and_the_start_values() {
         "<BaseStepSize>0.001</BaseStepSize>",
         r#"<Simulator name="law" source="law.fmu">"#,
         r#"<InitialValue variable="r">"#,
+        r#"<Boolean value="true"/>"#,
         r#"<Variable simulator="plant" name="y"/>"#,
     ] {
         assert_eq!(text.matches(part).count(), 1, "{part}\n{text}");

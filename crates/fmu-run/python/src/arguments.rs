@@ -135,29 +135,18 @@ pub fn with_unit<'py>(value: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, S
     (!of.is_instance_of::<PyString>()).then_some((of, unit))
 }
 
-/// [`in_own_unit`] or [`difference_in_own_unit`].
-pub type InOwnUnit = for<'py> fn(&System, &str, &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>;
-
-/// Converts (value, unit) to the unit of the variable, or of the elements of an array. Returns other values unchanged.
+/// Converts (value, unit) to the unit of the variable, or of the elements of an array. Returns other values unchanged. A difference, for
+/// example the derivative of a temperature, is converted without the offset of the unit.
 pub fn in_own_unit<'py>(
     system: &System,
     name: &str,
     value: &Bound<'py, PyAny>,
+    is_difference: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let Some((of, unit)) = with_unit(value) else { return Ok(value.clone()) };
     let (factor, offset) = display_unit(system, name, &unit)?;
     let numbers = array_of(name, &of)?;
-    numbers.sub(offset)?.div(factor)
-}
-
-/// Converts (value, unit) as [`in_own_unit`] does, but without the offset of the unit, for example for the derivative of a temperature.
-pub fn difference_in_own_unit<'py>(
-    system: &System,
-    name: &str,
-    value: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let Some((of, unit)) = with_unit(value) else { return Ok(value.clone()) };
-    array_of(name, &of)?.div(display_unit(system, name, &unit)?.0)
+    if is_difference { numbers.div(factor) } else { numbers.sub(offset)?.div(factor) }
 }
 
 /// Returns factor and offset of the conversion from the unit of a variable, or of the elements of an array, to another unit.

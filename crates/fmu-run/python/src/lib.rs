@@ -8,7 +8,6 @@ mod log;
 mod signals;
 mod start;
 
-use arguments::InOwnUnit;
 use buffers::{Numbers, Output};
 use fmu_run::{Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, System, Watch};
 use log::Log;
@@ -270,12 +269,11 @@ impl Loaded {
         let time = times(&time)?;
         let measures = arguments::names("measures", &measures)?;
         let outputs = arguments::names("outputs", &outputs)?;
-        let given = |name, values: Option<&Bound<'py, PyAny>>, in_own_unit: InOwnUnit| {
-            Signals::of(&model, &arguments::items(name, values)?, time.values().len(), in_own_unit)
+        let given = |name, values: Option<&Bound<'py, PyAny>>, are_rates| {
+            Signals::of(&model, &arguments::items(name, values)?, time.values().len(), are_rates)
         };
-        let inputs = given("inputs", inputs.as_ref(), arguments::in_own_unit)?;
-        let input_derivatives =
-            given("input_derivatives", input_derivatives.as_ref(), arguments::difference_in_own_unit)?;
+        let inputs = given("inputs", inputs.as_ref(), false)?;
+        let input_derivatives = given("input_derivatives", input_derivatives.as_ref(), true)?;
         let every = arguments::count("every", every.as_ref())?;
         arguments::callable("progress", progress.as_ref())?;
         let arrays = Arrays::of(&model, outputs.iter().map(String::as_str).chain(start.names()));

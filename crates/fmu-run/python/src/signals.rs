@@ -1,6 +1,6 @@
 //! Converts the inputs of runs: numbers, time series and whole arrays.
 
-use crate::arguments::InOwnUnit;
+use crate::arguments::in_own_unit;
 use crate::buffers::{Numbers, shape};
 use crate::exact::{Exact, exact_type};
 use fmu_run::{System, Trajectory, Value};
@@ -32,12 +32,12 @@ enum Values {
 }
 
 impl Signals {
-    /// Converts inputs, whose values are given for this number of communication points or at their own times.
+    /// Converts inputs or their rates, whose values are given for this number of communication points or at their own times.
     pub fn of(
         system: &System,
         given: &[(String, Bound<'_, PyAny>)],
         times: usize,
-        in_own_unit: InOwnUnit,
+        are_rates: bool,
     ) -> PyResult<Self> {
         let mut signals = Self::default();
         for (name, value) in given {
@@ -58,7 +58,7 @@ impl Signals {
                 signals.0.push(Signal { name, values, times: None, by_time: false, by_run: false });
                 continue;
             }
-            let values = Numbers::of(name, &in_own_unit(system, name, &value)?)?;
+            let values = Numbers::of(name, &in_own_unit(system, name, &value, are_rates)?)?;
             match array {
                 None => signals.push(name, &[], values, std::slice::from_ref(name), (own_times, times))?,
                 Some(array) => signals.push(name, &array.sizes, values, &array.names, (own_times, times))?,

@@ -19,10 +19,6 @@ pub struct Start {
 
 enum Value {
     Numbers(Numbers),
-    /// A number for each run or instance.
-    Each(Vec<f64>),
-    Text(String),
-    Texts(Vec<String>),
     /// Strings, bytes or 64-bit integers: one for all runs or instances, or one for each.
     Exact(Exact),
 }
@@ -63,7 +59,7 @@ impl Start {
             self.given.push((name, value.unbind()));
             return Ok(());
         }
-        let value = in_own_unit(system, &name, &value)?;
+        let value = in_own_unit(system, &name, &value, false)?;
         match system.array(&name) {
             None => self.values.push((name.clone(), Value::of(&name, &value)?)),
             Some(array) => self.add_array(system, &name, array, &value)?,
@@ -111,14 +107,8 @@ impl Start {
             for (number, element) in array.names.iter().enumerate() {
                 let values =
                     if of.shape.is_empty() { of.values.clone() } else { every(&of.values, number, count) };
-                let own = if is_exact {
-                    let shape = if by_run { vec![values.len()] } else { Vec::new() };
-                    Value::Exact(Exact { values, shape })
-                } else {
-                    let texts: Vec<_> = values.iter().map(ToString::to_string).collect();
-                    if by_run { Value::Texts(texts) } else { Value::Text(texts.concat()) }
-                };
-                self.values.push((element.clone(), own));
+                let shape = if by_run { vec![values.len()] } else { Vec::new() };
+                self.values.push((element.clone(), Value::Exact(Exact { values, shape })));
             }
             return Ok(());
         }
@@ -127,8 +117,8 @@ impl Start {
         for (number, element) in array.names.iter().enumerate() {
             let all = numbers.values();
             let own = if numbers.shape().is_empty() { all.to_vec() } else { every(all, number, count) };
-            let own = if by_run { Value::Each(own) } else { Value::Numbers(Numbers::One(own[0])) };
-            self.values.push((element.clone(), own));
+            let own = if by_run { Numbers::Row(own) } else { Numbers::One(own[0]) };
+            self.values.push((element.clone(), Value::Numbers(own)));
         }
         Ok(())
     }
@@ -157,22 +147,16 @@ fn every<T: Clone>(values: &[T], first: usize, step: usize) -> Vec<T> {
 impl Value {
     fn value(&self) -> fmu_run::Start<'_> {
         match self {
-            Self::Numbers(numbers) if numbers.shape().is_empty() => fmu_run::Start::Same(numbers.values()[0]),
+            Self::Numbers(Numbers::One(number)) => fmu_run::Start::Same(*number),
             Self::Numbers(numbers) => fmu_run::Start::Each(numbers.values()),
-            Self::Each(numbers) => fmu_run::Start::Each(numbers),
-            Self::Text(text) => fmu_run::Start::Text(text),
-            Self::Texts(texts) => fmu_run::Start::EachText(texts),
             Self::Exact(of) if of.shape.is_empty() => fmu_run::Start::Value(&of.values[0]),
             Self::Exact(of) => fmu_run::Start::EachValue(&of.values),
         }
     }
 
     fn of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(text) = value.cast::<PyString>() {
-            return Ok(Self::Text(text.extract()?));
-        }
-        if let Ok(texts) = value.extract::<Vec<String>>() {
-            return Ok(Self::Texts(texts));
+        if value.is_instance_of::<PyString>() || value.extract::<Vec<String>>().is_ok() {
+            return Ok(Self::Exact(Exact::of(name, value)?));
         }
         let numbers = Numbers::of(name, value)?;
         match numbers.shape() {

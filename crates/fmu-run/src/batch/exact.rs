@@ -1,7 +1,7 @@
 //! Inputs whose values `f64` cannot represent: strings, bytes, 64-bit integers.
 
 use super::Trajectory;
-use super::resampling::Resampling;
+use super::series::Series;
 use crate::error::{Error, request};
 use crate::lookup::Found;
 use crate::selection::Target;
@@ -13,58 +13,32 @@ use fmi_abi::client::Rejection;
 /// An input with its values for all runs. Each value holds until the next one.
 pub(super) struct Input {
     targets: Vec<Target>,
-    values: Vec<Value>,
-    /// Number of values for each run; 0 if there is one value for all times of all runs.
-    length: usize,
-    /// Whether each run has its own values.
-    is_each: bool,
-    /// Index of the value at each communication point, if the input is given at its own times.
-    indices: Option<Vec<usize>>,
+    series: Series<'static, Value>,
 }
 
 impl Input {
     /// Checks the values of an input and converts them to its type.
     pub fn of(name: &str, found: &[Found], trajectory: Trajectory, time: &[f64]) -> Result<Self, Error> {
         let reals = |values: &[f64]| values.iter().copied().map(Value::Real).collect::<Vec<_>>();
-        let mut indices = None;
-        let (values, length) = match trajectory {
-            Trajectory::Constant(value) => (reals(&[value]), 0),
-            Trajectory::Shared(values) | Trajectory::EachRun(values) => (reals(values), time.len()),
+        let values = match trajectory {
+            Trajectory::Constant(value) => reals(&[value]),
+            Trajectory::Shared(values) | Trajectory::EachRun(values) | Trajectory::Sampled { values, .. } => {
+                reals(values)
+            }
             Trajectory::RateOf(_) => {
                 return request(format!("{name} is not a floating-point number and has no rate"));
             }
-            Trajectory::Value(value) => (vec![value.clone()], 0),
-            Trajectory::Values(values) => (values.to_vec(), time.len()),
-            Trajectory::Sampled { times, values } => {
-                indices = Some(Resampling::of(name, times, time)?.indices());
-                (reals(values), times.len())
-            }
-            Trajectory::SampledValues { times, values } => {
-                indices = Some(Resampling::of(name, times, time)?.indices());
-                (values.to_vec(), times.len())
-            }
+            Trajectory::Value(value) => vec![value.clone()],
+            Trajectory::Values(values) | Trajectory::SampledValues { values, .. } => values.to_vec(),
         };
-        if length != 0 && (values.len() % length != 0 || values.is_empty()) {
-            return request(format!("{name} has {} values for {length} times", values.len()));
-        }
         let values = values.into_iter().map(|value| exact(found[0], name, value));
         let values = values.collect::<Result<Vec<_>, _>>()?;
-        let is_each = length != 0 && values.len() > length;
-        Ok(Self {
-            targets: found.iter().copied().map(Target::of).collect(),
-            values,
-            length,
-            is_each,
-            indices,
-        })
+        let series = Series::of(name, values.into(), &trajectory, true, time)?;
+        Ok(Self { targets: found.iter().copied().map(Target::of).collect(), series })
     }
 
     fn value(&self, run: usize, time: usize) -> &Value {
-        if self.length == 0 {
-            return &self.values[0];
-        }
-        let index = self.indices.as_ref().map_or(time, |indices| indices[time]);
-        &self.values[if self.is_each { run * self.length } else { 0 } + index]
+        &self.series.of_run(run)[self.series.index(time)]
     }
 
     /// Returns whether the value at the time with this index is new: it is the first one, or differs from the one before.

@@ -1,21 +1,14 @@
 //! Values of the inputs, or of their time derivatives, in Co-Simulation.
 
-use super::inputs::{Inputs, Numbers};
-use super::resampling::Resampling;
+use super::inputs::Inputs;
+use super::series::Series;
 
 /// Inputs of a run.
 pub(super) struct InputRows<'a> {
-    values: Vec<Signal<'a>>,
+    /// The inputs, and their values in the run.
+    values: Vec<(&'a Series<'a, f64>, &'a [f64])>,
     /// Buffer for the values of all inputs at one communication point.
     row: Vec<f64>,
-}
-
-/// An input of a run.
-#[derive(Clone, Copy)]
-enum Signal<'a> {
-    Constant(f64),
-    Values(&'a [f64]),
-    Sampled(&'a Resampling, &'a [f64], bool),
 }
 
 impl<'a> InputRows<'a> {
@@ -24,17 +17,9 @@ impl<'a> InputRows<'a> {
     }
 
     /// Selects the values of a run.
-    pub fn begin(&mut self, inputs: &'a Inputs<'a>, run: usize, times: usize) {
+    pub fn begin(&mut self, inputs: &'a Inputs<'a>, run: usize) {
         self.values.clear();
-        self.values.extend(inputs.values.iter().map(|numbers| match numbers {
-            Numbers::Constant(value) => Signal::Constant(*value),
-            Numbers::Shared(values) => Signal::Values(values),
-            Numbers::EachRun(values) => Signal::Values(&values[run * times..][..times]),
-            Numbers::Sampled { resampling, values, is_held, is_each, .. } => {
-                let first = if *is_each { run * resampling.length() } else { 0 };
-                Signal::Sampled(resampling, &values[first..][..resampling.length()], *is_held)
-            }
-        }));
+        self.values.extend(inputs.values.iter().map(|series| (series, series.of_run(run))));
     }
 
     pub fn is_empty(&self) -> bool {
@@ -44,12 +29,8 @@ impl<'a> InputRows<'a> {
     /// Returns the values of all inputs at the time with this index.
     #[inline(always)]
     pub fn at(&mut self, time: usize) -> &[f64] {
-        for (value, signal) in self.row.iter_mut().zip(&self.values) {
-            *value = match signal {
-                Signal::Constant(value) => *value,
-                Signal::Values(values) => values[time],
-                Signal::Sampled(resampling, values, is_held) => resampling.value(values, time, *is_held),
-            };
+        for (value, (series, values)) in self.row.iter_mut().zip(&self.values) {
+            *value = series.value(values, time);
         }
         &self.row
     }

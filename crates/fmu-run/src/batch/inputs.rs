@@ -1,7 +1,7 @@
 //! Checks the inputs of a batch.
 
 use super::exact::Input;
-use super::resampling::Resampling;
+use super::series::Series;
 use super::{Batch, Trajectory};
 use crate::description::Variable;
 use crate::error::{Error, request};
@@ -9,26 +9,13 @@ use crate::lookup::{Found, article, is_exact};
 use crate::selection::{Selection, fits};
 use crate::system::System;
 use fmi_abi::{BaseType, Standard, Variability};
+use std::borrow::Cow;
 
 /// Numeric inputs and their values.
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
-    pub values: Vec<Numbers<'a>>,
-}
-
-/// Values of a numeric input.
-pub(super) enum Numbers<'a> {
-    Constant(f64),
-    Shared(&'a [f64]),
-    EachRun(&'a [f64]),
-    /// Values at the input's own times. `is_each`: whether each run has its own values.
-    Sampled {
-        resampling: Resampling,
-        values: &'a [f64],
-        is_held: bool,
-        is_each: bool,
-    },
+    pub values: Vec<Series<'a, f64>>,
 }
 
 /// Checks the names of the inputs. Adds the inputs whose values `f64` cannot represent to `exact`, and passes all others to
@@ -92,14 +79,11 @@ pub(super) fn checked<'a>(
     trajectory: Trajectory<'a>,
     is_held: bool,
     time: &[f64],
-) -> Result<Numbers<'a>, Error> {
-    let numbers = match trajectory {
-        Trajectory::Constant(value) => Numbers::Constant(value),
-        Trajectory::Shared(values) => Numbers::Shared(values),
-        Trajectory::EachRun(values) => Numbers::EachRun(values),
-        Trajectory::Sampled { times, values } => {
-            let resampling = Resampling::of(name, times, time)?;
-            Numbers::Sampled { resampling, values, is_held, is_each: values.len() > times.len() }
+) -> Result<Series<'a, f64>, Error> {
+    let values: Cow<[f64]> = match trajectory {
+        Trajectory::Constant(value) => vec![value].into(),
+        Trajectory::Shared(values) | Trajectory::EachRun(values) | Trajectory::Sampled { values, .. } => {
+            values.into()
         }
         Trajectory::RateOf(other) => {
             return request(format!(
@@ -110,13 +94,6 @@ pub(super) fn checked<'a>(
             return request(format!("{name} is a number; give its values as numbers"));
         }
     };
-    let values = match &numbers {
-        Numbers::Constant(value) => std::slice::from_ref(value),
-        Numbers::Shared(values) if values.len() != time.len() => {
-            return request(format!("{name} has {} values for {} times", values.len(), time.len()));
-        }
-        Numbers::Shared(values) | Numbers::EachRun(values) | Numbers::Sampled { values, .. } => values,
-    };
-    fits(name, base, values)?;
-    Ok(numbers)
+    fits(name, base, &values)?;
+    Series::of(name, values, &trajectory, is_held, time)
 }

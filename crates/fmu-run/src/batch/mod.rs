@@ -10,6 +10,7 @@ mod plan;
 mod pulse;
 mod resampling;
 mod run;
+mod series;
 mod watch;
 mod worker;
 

@@ -1,7 +1,8 @@
 //! Checks the inputs and settings of runs in Model Exchange.
 
 use super::exact::Input;
-use super::inputs::{Numbers, checked, each_input, is_held};
+use super::inputs::{checked, each_input, is_held};
+use super::series::Series;
 use super::{Batch, Trajectory};
 use crate::continuous::{Curve, Integration, Signals, Slopes};
 use crate::description::Description;
@@ -30,7 +31,7 @@ pub(super) struct ModelExchangePlan<'a> {
 /// Values of an input.
 enum Source<'a> {
     /// Values, and their time derivatives if there are any.
-    Numbers { values: Numbers<'a>, slopes: Option<Numbers<'a>>, is_held: bool },
+    Numbers { values: Series<'a, f64>, slopes: Option<Series<'a, f64>> },
     /// The time derivative of the input with this index.
     RateOf(usize),
 }
@@ -82,14 +83,14 @@ impl<'a> ModelExchangePlan<'a> {
             let base = (of.base, variables[0].description.standard);
             if is_held(of) {
                 let values = checked(name, base, trajectory, true, batch.time)?;
-                held.push(Source::Numbers { values, slopes: None, is_held: true });
+                held.push(Source::Numbers { values, slopes: None });
                 self.held.push(name, &variables);
             } else if let Trajectory::RateOf(other) = trajectory {
                 rates.push((name, other, variables));
             } else {
                 let values = checked(name, base, trajectory, false, batch.time)?;
                 let slopes = slopes(name, &trajectory, batch)?;
-                self.sources.push(Source::Numbers { values, slopes, is_held: false });
+                self.sources.push(Source::Numbers { values, slopes });
                 self.moving.push(name, &variables);
             }
             Ok(())
@@ -132,7 +133,7 @@ impl<'a> ModelExchangePlan<'a> {
 
 /// Returns the time derivatives of an input, if given. They must be constant, or given at the same times as the values of the
 /// input.
-fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Option<Numbers<'a>>, Error> {
+fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Option<Series<'a, f64>>, Error> {
     let mut given = batch.input_derivatives.iter().filter(|(of, _)| *of == name);
     let Some((_, slopes)) = given.next() else { return Ok(None) };
     if given.next().is_some() {
@@ -148,36 +149,22 @@ fn slopes<'a>(name: &str, values: &Trajectory, batch: &'a Batch) -> Result<Optio
     checked(name, (BaseType::Real, Standard::Fmi2), *slopes, false, batch.time).map(Some)
 }
 
-/// Returns the times and the values of a run.
-fn of_run<'a>(numbers: &'a Numbers<'a>, run: usize, points: &'a [f64]) -> (&'a [f64], &'a [f64]) {
-    let part =
-        |values: &'a [f64], length, is_each| &values[if is_each { run * length } else { 0 }..][..length];
-    match numbers {
-        Numbers::Constant(value) => (&points[..1], std::slice::from_ref(value)),
-        Numbers::Shared(values) => (points, values),
-        Numbers::EachRun(values) => (points, part(values, points.len(), true)),
-        Numbers::Sampled { resampling, values, is_each, .. } => {
-            (&resampling.times, part(values, resampling.length(), *is_each))
-        }
-    }
-}
-
 impl<'a> ModelExchangePlan<'a> {
     /// Returns the inputs of a run as functions of time.
     pub fn signals(&'a self, run: usize, points: &'a [f64]) -> Signals<'a> {
         let curve = |source: &'a Source<'a>| match source {
             Source::RateOf(index) => Curve::RateOf(*index),
-            Source::Numbers { values, slopes, is_held } => {
-                let (times, values) = of_run(values, run, points);
+            Source::Numbers { values: series, slopes } => {
+                let (times, values) = (series.times(points), series.of_run(run));
                 if let ([value], None) = (values, slopes) {
                     return Curve::Constant(*value);
                 }
-                let slopes = match slopes {
+                let slopes = match slopes.as_ref().map(|slopes| slopes.of_run(run)) {
                     None => Slopes::Lines,
-                    Some(Numbers::Constant(slope)) => Slopes::Constant(*slope),
-                    Some(slopes) => Slopes::Each(of_run(slopes, run, points).1),
+                    Some([slope]) => Slopes::Constant(*slope),
+                    Some(slopes) => Slopes::Each(slopes),
                 };
-                Curve::Samples { times, values, slopes, is_held: *is_held }
+                Curve::Samples { times, values, slopes, is_held: series.is_held }
             }
         };
         Signals::new(self.sources.iter().map(curve), self.moving.len())

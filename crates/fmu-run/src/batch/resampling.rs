@@ -41,11 +41,6 @@ impl Resampling {
         Ok(Self { times, at })
     }
 
-    /// Returns the number of times of the input.
-    pub fn length(&self) -> usize {
-        self.times.len()
-    }
-
     /// Returns the value at a communication point: interpolated linearly, or the earlier value if values are held.
     #[inline]
     pub fn value(&self, values: &[f64], point: usize, is_held: bool) -> f64 {
@@ -54,9 +49,9 @@ impl Resampling {
         if is_held || way == 0.0 { value } else { value + way * (values[index + 1] - value) }
     }
 
-    /// Returns the index of the value that holds at each communication point.
-    pub fn indices(&self) -> Vec<usize> {
-        self.at.iter().map(|(index, _)| *index).collect()
+    /// Returns the index of the value that holds at a communication point.
+    pub fn index(&self, point: usize) -> usize {
+        self.at[point].0
     }
 }
 
@@ -86,7 +81,7 @@ mod tests {
         };
         assert_eq!(all(false), [1.0, 1.0, 1.5, 5.0, 6.0, 6.0]);
         assert_eq!(all(true), [1.0, 1.0, 1.0, 5.0, 6.0, 6.0]);
-        assert_eq!(resampling.indices(), [0, 0, 0, 2, 3, 3]);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|point| resampling.index(point)), [0, 0, 0, 2, 3, 3]);
     }
 
     #[test]

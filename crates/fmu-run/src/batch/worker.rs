@@ -142,8 +142,8 @@ impl<'a> Worker<'a> {
             SystemInstance::renewed(self.used.take(), self.system, plan.interface, &self.logging());
         let mut instance = instance.map_err(|(text, is_silent)| Failure { at: None, text, is_silent })?;
         instance.forget_log();
-        self.inputs.begin(&plan.inputs, run, plan.time.len());
-        self.derivatives.begin(&plan.derivatives, run, plan.time.len());
+        self.inputs.begin(&plan.inputs, run);
+        self.derivatives.begin(&plan.derivatives, run);
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();

@@ -35,7 +35,9 @@ pub(crate) struct Parts<'a> {
     /// Time that was last set in the FMU, s; `None` if time, inputs and states must be set again.
     at: Option<f64>,
     x: Vec<f64>,
+    /// Buffers for inputs and derivatives.
     row: Vec<f64>,
+    values: Vec<f64>,
     /// Number of failed evaluations since the last step.
     misses: usize,
     /// Reason for the last failed evaluation, except evaluations with states beyond [`TOO_FAR`].
@@ -63,6 +65,7 @@ impl<'a> Model<'a> {
             at: None,
             x: Vec::new(),
             row: Vec::new(),
+            values: Vec::new(),
             misses: 0,
             miss: None,
             fault: None,
@@ -155,9 +158,8 @@ impl Parts<'_> {
     pub fn observe(&mut self, time: f64, x: &[f64]) -> Result<&mut SystemInstance, Rejection> {
         self.at = None;
         self.set(time, x)?;
-        let mut values = vec![0.0; x.len()];
         if !x.is_empty()
-            && let Err(rejection) = self.derivatives(time, x, &mut values)
+            && let Err(rejection) = self.read_derivatives(time, x)
             && rejection.status() != Status::Discard
         {
             return Err(rejection);
@@ -168,12 +170,20 @@ impl Parts<'_> {
     /// Evaluates the derivatives at the beginning of an interval and fails if one is not finite, because a shorter step would not
     /// help.
     pub fn check_derivatives(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
-        let mut values = vec![0.0; x.len()];
-        self.derivatives(time, x, &mut values)?;
-        match values.iter().position(|value| !value.is_finite()) {
+        self.read_derivatives(time, x)?;
+        match self.values.iter().position(|value| !value.is_finite()) {
             None => Ok(()),
-            Some(index) => Err(missing("the derivative of state", index, values[index], time)),
+            Some(index) => Err(missing("the derivative of state", index, self.values[index], time)),
         }
+    }
+
+    /// Reads the derivatives into the buffer `values`.
+    fn read_derivatives(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
+        let mut values = std::mem::take(&mut self.values);
+        values.resize(x.len(), 0.0);
+        let result = self.derivatives(time, x, &mut values);
+        self.values = values;
+        result
     }
 
     /// Reads the event indicators. Fails if one is NaN.

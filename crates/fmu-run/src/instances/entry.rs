@@ -28,6 +28,11 @@ pub(super) struct Progress {
 }
 
 impl Entry {
+    /// Returns whether a call acts on this instance, which has this index.
+    pub fn acts(&self, index: usize, mask: Mask) -> bool {
+        self.error.is_none() && mask.is_none_or(|mask| mask[index])
+    }
+
     /// Calls `body` if the instance has not failed. Returns whether the instance is usable afterwards.
     #[inline]
     pub fn with(

@@ -76,6 +76,8 @@ pub struct Instances {
     feed: Option<Arc<Feed>>,
     /// Threads in addition to the caller's.
     threads: Option<Threads>,
+    /// Name of a model that needs steps of equal size, if there is one.
+    fixed_step: Option<String>,
 }
 
 #[derive(Debug)]
@@ -142,6 +144,7 @@ impl System {
             begin: Begin { start, experiment: Experiment { start_time, stop_time, tolerance } },
             feed,
             threads: (threads > 1).then(|| Threads::new(threads - 1)).transpose()?,
+            fixed_step: self.fixed_step().map(str::to_owned),
         };
         instances.start_from(given)?;
         instances.reset(None);
@@ -284,8 +287,7 @@ impl Instances {
     /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance that would make the step, or if the
     /// size of the step differs from the size of the first one and an FMU needs steps of equal size.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
-        let steps = |index: usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
-        let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
+        let mut ahead = self.all.iter().enumerate().filter(|(index, one)| one.acts(*index, mask));
         if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.progress.time)) {
             return request(format!(
                 "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
@@ -331,15 +333,16 @@ impl Instances {
     /// If an FMU needs steps of equal size, fails if the next step would have another size than the first one. Otherwise records the
     /// size.
     fn check_equal_steps(&mut self, size: impl Fn(&Progress) -> f64, mask: Mask) -> Result<(), Error> {
-        let Some(model) = self.system.fixed_step() else { return Ok(()) };
-        let steps = |index: &usize, one: &Entry| one.error.is_none() && mask.is_none_or(|mask| mask[*index]);
-        for (_, one) in self.all.iter().enumerate().filter(|(index, one)| steps(index, one)) {
+        let Some(model) = &self.fixed_step else { return Ok(()) };
+        let mut first_steps = Vec::new();
+        for (index, one) in self.all.iter().enumerate().filter(|(index, one)| one.acts(*index, mask)) {
             let (size, progress) = (size(&one.progress), &one.progress);
-            check_equal_step(model, progress.first_step.unwrap_or(size), size, progress.time)?;
+            let first = progress.first_step.unwrap_or(size);
+            check_equal_step(model, first, size, progress.time)?;
+            first_steps.push((index, first));
         }
-        for (_, one) in self.all.iter_mut().enumerate().filter(|(index, one)| steps(index, one)) {
-            let size = size(&one.progress);
-            one.progress.first_step.get_or_insert(size);
+        for (index, first) in first_steps {
+            self.all[index].progress.first_step = Some(first);
         }
         Ok(())
     }

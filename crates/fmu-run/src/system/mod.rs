@@ -5,8 +5,6 @@ mod elements;
 mod order;
 #[cfg(feature = "write")]
 mod osp;
-#[cfg(feature = "write")]
-mod packed;
 mod ssp;
 #[cfg(feature = "write")]
 mod structure;
@@ -23,7 +21,7 @@ use crate::selection::Selection;
 pub use elements::Elements;
 use fmi_abi::description::Offer;
 use fmi_abi::files::Limits;
-use fmi_abi::{BaseType, Causality, Interface, shown};
+use fmi_abi::{BaseType, Causality, Interface, Value, shown};
 pub(crate) use order::Exchange;
 pub use order::Order;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -58,7 +56,7 @@ struct Definition {
     /// Index of the first connection to each input.
     sources: HashMap<String, usize>,
     exchange: Exchange,
-    start: Vec<(String, StartValue)>,
+    start: Vec<(String, Value)>,
     stop_time: Option<f64>,
     pool: Pool,
     /// Arrays by name, found when they are first needed.
@@ -101,15 +99,6 @@ pub struct Composition<'a> {
     pub connections: Vec<(&'a str, &'a str)>,
     /// Determines when outputs are passed to inputs.
     pub order: Order,
-}
-
-/// A start value of a system.
-#[derive(Clone, Debug, PartialEq)]
-pub enum StartValue {
-    /// A number; 0 or 1 for a Boolean.
-    Number(f64),
-    /// A string.
-    Text(String),
 }
 
 impl System {
@@ -157,8 +146,8 @@ impl System {
         pairs.map(|pairs| pairs.map(|(from, to)| (from.as_str(), to.as_str())).collect()).collect()
     }
 
-    /// Returns the start values of the system.
-    pub fn start(&self) -> &[(String, StartValue)] {
+    /// Returns the start values of the system by variable: numbers and strings.
+    pub fn start(&self) -> &[(String, Value)] {
         &self.0.start
     }
 

@@ -2,6 +2,7 @@
 
 use super::structure::{CheckedStructure, document, file_name, split};
 use crate::error::Error;
+use fmi_abi::boolean;
 use fmi_abi::write::{Element, write_atomically};
 use std::io::Write;
 use std::path::Path;
@@ -57,10 +58,13 @@ impl CheckedStructure<'_> {
 
     /// Returns the element of an initial value. An item of an enumeration is written as its number.
     fn initial_value(&self, name: &str, start: &str) -> Result<Element, Error> {
-        let variable = self.variable(name)?;
-        Ok(match variable.number_of(start) {
-            Some(number) => Element::new("Integer").with("value", number),
-            None => Element::new(variable.kind()).with("value", start),
+        let found = self.variable(name)?;
+        let items = found.description.items(found.variable).unwrap_or_default();
+        Ok(match (items.iter().find(|(item, _)| item == start), found.variable.kind()) {
+            (Some((_, number)), _) => Element::new("Integer").with("value", number),
+            // Not 0 or 1, which few parsers accept.
+            (None, "Boolean") => Element::new("Boolean").with("value", boolean(start) == Some(true)),
+            (None, kind) => Element::new(kind).with("value", start),
         })
     }
 }

@@ -1,9 +1,11 @@
 //! The structure of a system that is written, and the checks of its consistency.
 
-use super::packed::{FmuVariable, PackedFmu};
+use crate::description::{Attributes, Description};
 use crate::error::{Error, request};
-use fmi_abi::Causality;
-use fmi_abi::write::Element;
+use crate::lookup::{Found, is_exact};
+use crate::start::{exact, number_of};
+use fmi_abi::{Causality, Value};
+use fmi_abi::write::{Element, unzip};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +30,7 @@ use std::path::{Path, PathBuf};
 /// # }
 /// ```
 ///
-/// Start values are strings: numbers, `true` or `false`, an item of an enumeration, or the value of a String.
+/// Start values are strings: numbers; `true`, `false`, `1` or `0`; an item of an enumeration; or the value of a String.
 #[derive(Clone, Debug)]
 pub struct SystemStructure<'a> {
     /// Name for users.
@@ -54,7 +56,8 @@ pub struct SystemStructure<'a> {
 /// The structure of a system whose FMUs have been read and whose connections have been checked.
 pub struct CheckedStructure<'a> {
     pub(super) structure: &'a SystemStructure<'a>,
-    fmus: Vec<PackedFmu>,
+    /// The FMUs of the components: their bytes and model descriptions.
+    fmus: Vec<(Vec<u8>, Description)>,
     /// Units by name, each with the exponents of SI base units, factor and offset.
     pub(super) units: BTreeMap<String, Vec<(String, String)>>,
 }
@@ -88,7 +91,7 @@ impl<'a> SystemStructure<'a> {
         checked.check_files()?;
         let mut fed = Vec::new();
         for (_, to, start) in &self.inputs {
-            checked.find(to, Causality::Input)?.check_start(to, start).map_err(Error::Request)?;
+            check_start(checked.find(to, Causality::Input)?, to, start)?;
             fed.push(*to);
         }
         for (_, from) in &self.outputs {
@@ -96,7 +99,8 @@ impl<'a> SystemStructure<'a> {
         }
         for (from, to) in &self.connections {
             let (a, b) = (checked.find(from, Causality::Output)?, checked.find(to, Causality::Input)?);
-            a.check_feeds(b).map_err(|why| Error::Request(format!("{from} cannot feed {to}: {why}")))?;
+            let connects = a.description.connects(a.variable, b.description, b.variable);
+            connects.map_err(|why| Error::Request(format!("{from} cannot feed {to}: {why}")))?;
             fed.push(*to);
         }
         fed.sort_unstable();
@@ -104,11 +108,7 @@ impl<'a> SystemStructure<'a> {
             return request(format!("{} is fed twice", pair[0]));
         }
         for (name, start) in &self.start {
-            let variable = checked.variable(name)?;
-            variable
-                .check_settable(name)
-                .and_then(|()| variable.check_start(name, start))
-                .map_err(Error::Request)?;
+            check_start(checked.variable(name)?, name, start)?;
         }
         Ok(checked)
     }
@@ -116,23 +116,25 @@ impl<'a> SystemStructure<'a> {
 
 impl CheckedStructure<'_> {
     fn read(&mut self, path: &Path) -> Result<(), String> {
-        let fmu = PackedFmu::read(path)?;
-        for (name, unit) in &fmu.description.units {
+        let bytes = std::fs::read(path).map_err(|error| format!("it cannot be read: {error}"))?;
+        let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?);
+        let description = Description::parse(&text.map_err(|error| error.to_string())?)?;
+        for (name, unit) in &description.units {
             let before = self.units.entry(name.clone()).or_insert_with(|| unit.clone());
             if before != unit {
                 return Err(format!("its unit {name} differs from the unit of this name in another FMU"));
             }
         }
-        self.fmus.push(fmu);
+        self.fmus.push((bytes, description));
         Ok(())
     }
 
     /// Checks that different FMUs have different file names. Components with equal FMUs share one file.
     fn check_files(&self) -> Result<(), Error> {
         let mut files = BTreeMap::new();
-        for ((_, path), fmu) in self.structure.components.iter().zip(&self.fmus) {
-            let (first, content) = files.entry(file_name(path)?).or_insert((path, &fmu.bytes));
-            if *content != &fmu.bytes {
+        for ((_, path), (bytes, _)) in self.structure.components.iter().zip(&self.fmus) {
+            let (first, content) = files.entry(file_name(path)?).or_insert((path, bytes));
+            if *content != bytes {
                 let (one, other) = (first.display(), path.display());
                 return request(format!(
                     "{one} and {other} are different and have the same file name; rename one of them"
@@ -145,10 +147,10 @@ impl CheckedStructure<'_> {
     /// Returns the file name and the content of each FMU, without duplicates.
     pub(super) fn files(&self) -> Result<BTreeMap<&str, &[u8]>, Error> {
         let fmus = self.structure.components.iter().zip(&self.fmus);
-        fmus.map(|((_, path), fmu)| Ok((file_name(path)?, fmu.bytes.as_slice()))).collect()
+        fmus.map(|((_, path), (bytes, _))| Ok((file_name(path)?, bytes.as_slice()))).collect()
     }
 
-    fn find(&self, name: &str, wanted: Causality) -> Result<FmuVariable<'_>, Error> {
+    fn find(&self, name: &str, wanted: Causality) -> Result<Found<'_>, Error> {
         let found = self.variable(name)?;
         let causality = found.variable.causality;
         if causality != wanted {
@@ -157,11 +159,15 @@ impl CheckedStructure<'_> {
         Ok(found)
     }
 
-    pub(super) fn variable(&self, name: &str) -> Result<FmuVariable<'_>, Error> {
+    pub(super) fn variable(&self, name: &str) -> Result<Found<'_>, Error> {
         let (component, own) = split(name);
-        let index = self.structure.components.iter().position(|(known, _)| *known == component);
-        let variable = index.and_then(|index| self.fmus[index].variable(own));
-        variable.ok_or_else(|| Error::Request(format!("no FMU has a variable {name}")))
+        let component = self.structure.components.iter().position(|(known, _)| *known == component);
+        let found = component.and_then(|component| {
+            let (_, description) = &self.fmus[component];
+            let variable = description.variable(own)?;
+            Some(Found { component, variable, description, source: None, connector: None })
+        });
+        found.ok_or_else(|| Error::Request(format!("no FMU has a variable {name}")))
     }
 
     /// Returns the start values of a component: the full name of each variable, and its value.
@@ -169,6 +175,41 @@ impl CheckedStructure<'_> {
         let start = self.structure.start.iter().filter(|(name, _)| split(name).0 == component);
         start.map(|(name, start)| (*name, start.as_str())).collect()
     }
+}
+
+/// Fails if a system cannot set the start value of this variable, or if the string is not a valid value: a number in the range, a Boolean, a
+/// string, or an item of the enumeration.
+fn check_start(found: Found, name: &str, text: &str) -> Result<(), Error> {
+    found.check_start(name)?;
+    let Attributes { min, max, base, .. } = &**found.variable;
+    let number: Option<f64> = match found.variable.kind() {
+        "Real" => text.parse().ok(),
+        "Integer" => text.parse::<i64>().ok().map(|value| value as f64),
+        _ => None,
+    };
+    let Some(value) = number else {
+        let value = Value::from(text);
+        return if is_exact(*base) {
+            exact(found, name, value).map(drop)
+        } else {
+            number_of(found, name, &value).map(drop)
+        };
+    };
+    let must = |rule: String| request(format!("the start value of {name} must {rule}, it is {value}"));
+    if !value.is_finite() {
+        return must("be a finite number".to_owned());
+    }
+    let [lowest, highest] = match base.range() {
+        Some((lowest, highest)) => [Some(lowest as f64), Some(highest as f64)],
+        None => [None, None],
+    };
+    if let Some(min) = min.or(lowest).filter(|min| value < *min) {
+        return must(format!("not be below {min}"));
+    }
+    if let Some(max) = max.or(highest).filter(|max| value > *max) {
+        return must(format!("not be above {max}"));
+    }
+    Ok(())
 }
 
 /// Writes `root` and what it contains as an XML document in UTF-8.

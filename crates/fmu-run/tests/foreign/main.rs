@@ -515,37 +515,3 @@ fn structural_parameters_change_the_sizes_of_arrays() {
     let set = one.set(&one.system().select(&["size"]).unwrap(), &[3.0], None).unwrap_err().to_string();
     assert!(set.contains("size is a structural parameter"), "{set}");
 }
-
-#[test]
-fn inputs_have_their_own_times() {
-    for standard in VERSIONS {
-        let (fmu, time) = (opened("plain", standard), times());
-        let batch = Batch {
-            time: &time,
-            inputs: vec![
-                (
-                    "u",
-                    Trajectory::Sampled {
-                        times: &[0.0, 0.5, 0.5, 1.0],
-                        values: &[0.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 5.0],
-                    },
-                ),
-                ("valve", Trajectory::Sampled { times: &[0.0, 0.3], values: &[1.0, 4.0] }),
-            ],
-            outputs: vec!["u", "valve"],
-            every: Some(1),
-            ..Batch::default()
-        };
-        let runs = fmu.run(&batch, &Watch::default()).unwrap();
-        assert_eq!(runs.size.runs, 2);
-        let row = |index: usize| &runs.trajectories[11 * index..][..11];
-        let expected = [0.0, 0.2, 0.4, 0.6, 0.8, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0];
-        assert!(
-            row(0).iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12),
-            "{:?}",
-            row(0)
-        );
-        assert_eq!(row(1), [1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0]);
-        assert_eq!(row(2), [5.0; 11]);
-    }
-}

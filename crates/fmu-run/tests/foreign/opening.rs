@@ -34,6 +34,7 @@ fn messages_say_what_a_file_is() {
         )
     };
     let (one, scheduled) = (xml("1.0", ""), xml("3.0", "<ScheduledExecution modelIdentifier=\"m\"/>"));
+    let none = xml("3.0", "");
     let sources = xml("3.0", "<CoSimulation modelIdentifier=\"m\"/>");
     for (path, why) in [
         (directory.path().join("missing.fmu"), "cannot be opened (No such file"),
@@ -52,6 +53,8 @@ fn messages_say_what_a_file_is() {
             "is not an FMU but a system (SSP); open it with System",
         ),
         (archive("one.fmu", &[("modelDescription.xml", &one)]), "FMPy and PyFMI run FMI 1.0"),
+        (archive("broken.fmu", &[("modelDescription.xml", "<a")]), "is not well-formed XML"),
+        (archive("none.fmu", &[("modelDescription.xml", &none)]), "neither Co-Simulation nor Model Exchange"),
         (archive("scheduled.fmu", &[("modelDescription.xml", &scheduled)]), "only Scheduled Execution"),
         (
             archive("sources.fmu", &[("modelDescription.xml", &sources), ("sources/m.c", "")]),

@@ -6,16 +6,16 @@ use super::source::Base;
 use crate::change::Change;
 use crate::error::{Error, request};
 use crate::lookup::Found;
-use crate::system::{Definition, StartValue};
+use crate::system::Definition;
 use fmi_abi::files::read_xml;
-use fmi_abi::{boolean, shown, xml};
+use fmi_abi::{Value, boolean, shown, xml};
 use roxmltree::Node;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A value of a parameter set.
+/// A parameter of a parameter set.
 #[derive(Clone)]
-struct Value {
+struct Parameter {
     kind: String,
     text: String,
     unit: Option<NamedUnit>,
@@ -55,7 +55,7 @@ impl<'t> Target<'t> {
     /// Returns the start values by the names of variables, in their units. Later values replace earlier ones, and values of a system
     /// replace values of the systems and components in it. Values without a variable are ignored, because a parameter set may be made for
     /// several systems. Values of inputs that are connected to outputs are left out, because the outputs replace them.
-    pub fn start_values(&self) -> Result<Vec<(String, StartValue)>, Error> {
+    pub fn start_values(&self) -> Result<Vec<(String, Value)>, Error> {
         let (read, mut all) = (self.read, Vec::new());
         for binding in &read.bindings {
             let directory = binding.component.map(|index| self.definition.components[index].fmu.directory());
@@ -78,9 +78,9 @@ impl<'t> Target<'t> {
     fn apply(
         &self,
         name: &str,
-        value: &Value,
+        value: &Parameter,
         entry: Option<&Entry>,
-        all: &mut Vec<(String, StartValue)>,
+        all: &mut Vec<(String, Value)>,
     ) -> Result<(), Error> {
         let Self { read, definition, routes, next } = self;
         let is_overwritten =
@@ -96,7 +96,7 @@ impl<'t> Target<'t> {
         for (variable, change) in ends {
             let found = definition.look_up(variable).filter(|found| found.source.is_none());
             if let Some(found) = found {
-                let bytes = variable.len() + value.text.len() + size_of::<(String, StartValue)>();
+                let bytes = variable.len() + value.text.len() + size_of::<(String, Value)>();
                 read.take(bytes).map_err(|why| read.fail(&why))?;
                 let value = value.converted(name, found, unit.as_ref(), entry, &change)?;
                 all.push((variable.to_owned(), value));
@@ -128,7 +128,11 @@ impl Read<'_> {
     }
 
     /// Reads the values of a parameter binding, by name.
-    fn values(&self, binding: &Binding, directory: Option<&Path>) -> Result<Vec<(String, Value)>, String> {
+    fn values(
+        &self,
+        binding: &Binding,
+        directory: Option<&Path>,
+    ) -> Result<Vec<(String, Parameter)>, String> {
         let prefix = binding.node.attribute("prefix").unwrap_or_default();
         if let Some(values) = child(binding.node, "ParameterValues") {
             let set = child(values, "ParameterSet");
@@ -142,7 +146,7 @@ impl Read<'_> {
         self.parameters(document.root_element(), prefix)
     }
 
-    fn parameters(&self, set: Node, prefix: &str) -> Result<Vec<(String, Value)>, String> {
+    fn parameters(&self, set: Node, prefix: &str) -> Result<Vec<(String, Parameter)>, String> {
         let units = units(set);
         let mut found = Vec::new();
         for parameter in children(set, "Parameters") {
@@ -154,9 +158,9 @@ impl Read<'_> {
             let unit = value
                 .attribute("unit")
                 .map(|unit| NamedUnit { name: unit.into(), definition: units.get(unit).copied() });
-            self.take(name.len() + text.len() + size_of::<(String, Value)>())?;
+            self.take(name.len() + text.len() + size_of::<(String, Parameter)>())?;
             let (kind, text) = (value.tag_name().name().to_owned(), text.to_owned());
-            found.push((name, Value { kind, text, unit }));
+            found.push((name, Parameter { kind, text, unit }));
         }
         Ok(found)
     }
@@ -188,7 +192,7 @@ impl Read<'_> {
     }
 }
 
-impl Value {
+impl Parameter {
     /// Converts the value to the unit of the parameter with this name, applies the transformation of the mapping, and then the change on
     /// the way to the variable.
     fn converted(
@@ -198,7 +202,7 @@ impl Value {
         unit: Option<&NamedUnit>,
         entry: Option<&Entry>,
         change: &Change,
-    ) -> Result<StartValue, Error> {
+    ) -> Result<Value, Error> {
         let transformation = entry.and_then(|entry| entry.transformation.as_ref());
         let number = match self.kind.as_str() {
             "Real" | "Integer" => Some(self.text.trim().parse::<f64>().map_err(|_| {
@@ -213,10 +217,10 @@ impl Value {
         };
         let Some(mut number) = number else {
             return match transformation {
-                None => Ok(StartValue::Text(self.text.clone())),
+                None => Ok(Value::String(self.text.clone())),
                 Some(Transformation::Names(pairs)) => {
                     let mapped = pairs.iter().find(|(from, _)| *from == self.text);
-                    Ok(StartValue::Text(mapped.map_or(&self.text, |(_, to)| to).clone()))
+                    Ok(Value::String(mapped.map_or(&self.text, |(_, to)| to).clone()))
                 }
                 Some(_) => request(format!("{} has a transformation, but is not a number", shown(name))),
             };
@@ -236,6 +240,6 @@ impl Value {
             let fail = |why| Error::Request(format!("the value of {} cannot be mapped: {why}", shown(name)));
             number = change.map_err(fail)?.apply(number);
         }
-        Ok(StartValue::Number(change.apply(number)))
+        Ok(Value::Real(change.apply(number)))
     }
 }

@@ -240,15 +240,10 @@ impl Read<'_> {
             }
         }
         let loose = self.connectors.iter().filter(|(name, of)| {
-            of.is_of_system
-                && !definition.connectors.contains_key(*name)
-                && !routes.contains_key(name.as_str())
+            let is_named = if routes.contains_key(name.as_str()) { of.is_outer } else { of.is_of_system };
+            is_named && !definition.connectors.contains_key(*name)
         });
         definition.loose = loose.map(|(name, _)| name.clone()).collect();
-        let outer = routes.keys().filter(|name| self.connectors.get(**name).is_some_and(|of| of.is_outer));
-        definition.loose.extend(
-            outer.filter(|name| !definition.connectors.contains_key(**name)).map(|name| (*name).to_owned()),
-        );
         definition.set_connections(connections, changes);
     }
 

@@ -3,7 +3,7 @@
 use super::FMU;
 use crate::error::{Error, request};
 use crate::files::STRUCTURE;
-use crate::system::packed::{FmuVariable, Items};
+use crate::lookup::Found;
 use crate::system::structure::{CheckedStructure, SystemStructure, document, file_name, split};
 use fmi_abi::write::{Element, write_atomically, zip};
 use std::collections::{BTreeMap, HashSet};
@@ -116,7 +116,7 @@ impl CheckedStructure<'_> {
     }
 
     /// Returns the variables at both ends of all connections. Their units and enumerations are defined in the file.
-    fn connected(&self) -> Result<Vec<FmuVariable<'_>>, Error> {
+    fn connected(&self) -> Result<Vec<Found<'_>>, Error> {
         let SystemStructure { inputs, outputs, connections, .. } = self.structure;
         let ends = connections.iter().flat_map(|(from, to)| [*from, *to]);
         let ends =
@@ -125,7 +125,7 @@ impl CheckedStructure<'_> {
     }
 
     /// Returns the definitions of the units that the variables use.
-    fn units_of(&self, variables: &[FmuVariable]) -> Vec<Element> {
+    fn units_of(&self, variables: &[Found]) -> Vec<Element> {
         let used: HashSet<_> = variables.iter().map(|of| of.variable.unit.as_deref()).collect();
         let units = self.units.keys().filter(|name| used.contains(&Some(name.as_str())));
         units.filter_map(|name| self.unit(name)).collect()
@@ -140,9 +140,9 @@ impl CheckedStructure<'_> {
     /// Returns a connector with the type and unit of a variable.
     fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element, Error> {
         let of = self.variable(of)?;
-        let base_type = Element::new(format!("ssc:{}", of.kind()))
+        let base_type = Element::new(format!("ssc:{}", of.variable.kind()))
             .with_some("unit", of.variable.unit.as_ref())
-            .with_some("name", of.items().map(|(name, _)| name));
+            .with_some("name", enumeration(of).map(|(name, _)| name));
         Ok(Element::new("ssd:Connector").with("name", name).with("kind", kind).containing([base_type]))
     }
 
@@ -158,8 +158,9 @@ impl CheckedStructure<'_> {
         for (name, variable, start) in start {
             let of = self.variable(variable)?;
             let unit = of.variable.unit.as_ref();
-            let value =
-                Element::new(format!("ssv:{}", of.kind())).with("value", start).with_some("unit", unit);
+            let value = Element::new(format!("ssv:{}", of.variable.kind()))
+                .with("value", start)
+                .with_some("unit", unit);
             units.extend(unit.and_then(|unit| Some((unit, self.unit(unit)?))));
             parameters.push(Element::new("ssv:Parameter").with("name", name).containing([value]));
         }
@@ -179,10 +180,18 @@ impl CheckedStructure<'_> {
     }
 }
 
+/// Names and numbers of the items of an enumeration.
+type Items = [(String, String)];
+
+/// Returns the name and the items of the enumeration of a variable, if it has one.
+fn enumeration<'a>(of: Found<'a>) -> Option<(&'a str, &'a Items)> {
+    Some((of.variable.declared_type.as_deref()?, of.description.items(of.variable)?))
+}
+
 /// Returns the enumerations of variables, if there are any.
-fn enumerations(variables: &[FmuVariable]) -> Result<Option<Element>, Error> {
+fn enumerations(variables: &[Found]) -> Result<Option<Element>, Error> {
     let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
-    for (name, items) in variables.iter().filter_map(|of| of.items()) {
+    for (name, items) in variables.iter().filter_map(|of| enumeration(*of)) {
         let before = known.entry(name).or_insert(items);
         if *before != items {
             return request(format!("two FMUs have different enumerations with the name {name}"));
