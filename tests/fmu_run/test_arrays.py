@@ -262,7 +262,7 @@ def test_whole_arrays_of_inputs_for_each_run(rods) -> None:
             (
                 {"power": power[:, :, :1]},
                 {},
-                r"power has the shape \(3, 5, 1\); it must be \(5, 2\), \(runs, 5, 2\), \(2,\) or a number",
+                r"power has the shape \(3, 5, 1\); it must be \(5, 2\), \(runs, 5, 2\), \(2,\) or one value",
             ),
             ({"power": np.zeros(5)}, {}, r"power has the shape \(5,\)"),
             (

@@ -31,7 +31,7 @@ def fmu(testbed):
     [
         ({"inputs": {"thet1": 0.0}}, 'has no variable "thet1"; did you mean "theta1"?'),
         ({"outputs": ["Roll_Rate"]}, 'has no variable "Roll_Rate"; did you mean "roll_rate"?'),
-        ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
+        ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or one value"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
         ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are not numbers"),
         ({"inputs": {"k1": TIME}}, "k1 is not an input but a fixed parameter; give it a start value"),

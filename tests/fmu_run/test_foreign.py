@@ -190,7 +190,7 @@ def test_inputs_with_their_own_times(made):
     assert two["u"].tolist() == [[1.0, 2.0]]
     assert fmu.run(TIME[:2], inputs={"u": [[1.0, 2.0], [3.0, 4.0]]}, outputs=["u"])["u"].tolist() == [[1, 2], [3, 4]]
     for value, why in [
-        (([0.0, 1.0], [1.0, 2.0, 3.0]), "u has the shape (3,); it must be (2,), (runs, 2) or a number"),
+        (([0.0, 1.0], [1.0, 2.0, 3.0]), "u has the shape (3,); it must be (2,), (runs, 2) or one value"),
         (([1.0, 0.0], [1.0, 2.0]), "the times of u decrease: 0 follows 1"),
         (([0.0, np.nan], [1.0, 2.0]), "times must be finite"),
         (([[0.0], [1.0]], [1.0, 2.0]), "the times of u have the shape (2, 1)"),

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Maximum number of characters of an error message; longer messages are shortened.
 const LONGEST: usize = 1000;
@@ -34,6 +35,20 @@ impl Error {
 /// Returns an [`Error::Request`].
 pub(crate) fn request<T>(message: String) -> Result<T, Error> {
     Err(Error::Request(message))
+}
+
+/// Locks a mutex, also after a panic of another thread.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns the item with this name. The error names all items.
+pub(crate) fn named<T: Copy>(all: &[(&str, T)], kind: &str, name: &str) -> Result<T, String> {
+    let found = all.iter().find(|(known, _)| *known == name);
+    found.map(|(_, item)| *item).ok_or_else(|| {
+        let names: Vec<_> = all.iter().map(|(known, _)| *known).collect();
+        format!("there is no {kind} {name:?}; there are {}", names.join(", "))
+    })
 }
 
 /// Calls `body` for a run or an instance. If it panics, for example because of an absurd value that an FMU returns, the result is a

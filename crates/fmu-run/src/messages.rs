@@ -1,8 +1,9 @@
 //! Collects the messages of FMUs for callers that request all of them.
 
+use crate::error::lock;
 use fmi_abi::client::{LogListener, Message};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A message of an FMU.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,10 +27,6 @@ pub(crate) struct Feed {
     /// Index and time, s, of the run that an instance performs, by the index of the instance.
     runs: Mutex<HashMap<usize, (usize, f64)>>,
     logged: Mutex<Vec<Logged>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Feed {

@@ -1,10 +1,10 @@
 //! Instances and threads that a system reuses in later runs.
 
-use crate::error::Error;
+use crate::error::{Error, lock};
 use crate::instance::Instance;
 use crate::threads::Threads;
 use fmi_abi::Interface;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 /// Idle instances and threads of a system.
 #[derive(Debug, Default)]
@@ -50,8 +50,4 @@ impl Pool {
         let (idle, threads) = (std::mem::take(&mut *lock(&self.idle)), lock(&self.threads).take());
         drop((idle, threads));
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,7 +1,7 @@
 //! Values that float64 cannot represent: strings, bytes and 64-bit integers.
 
 use crate::arguments::wrong;
-use crate::buffers::shape;
+use crate::buffers::{Numbers, shape};
 use fmu_run::{BaseType, System, Value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,6 +13,43 @@ pub struct Exact {
     pub values: Vec<Value>,
     /// Lengths of the nested sequences in which the values were given; empty for a single value.
     pub shape: Vec<usize>,
+}
+
+/// Values of a variable or an array: numbers, or values that float64 cannot represent.
+pub enum Values {
+    Numbers(Numbers),
+    Exact(Exact),
+}
+
+impl Values {
+    /// Returns the shape in which the values were given; empty for a single value.
+    pub fn shape(&self) -> &[usize] {
+        match self {
+            Self::Numbers(numbers) => numbers.shape(),
+            Self::Exact(exact) => &exact.shape,
+        }
+    }
+
+    /// Returns the values of the element with this number, in an array of `count` elements: a series, or one value. A single value is the
+    /// value of all elements.
+    pub fn element(&self, number: usize, count: usize, is_series: bool) -> Self {
+        fn every<T: Clone>(values: &[T], first: usize, step: usize) -> Vec<T> {
+            values.iter().skip(first).step_by(step).cloned().collect()
+        }
+        match self {
+            Self::Numbers(Numbers::One(value)) => Self::Numbers(Numbers::One(*value)),
+            Self::Numbers(numbers) => {
+                let own = every(numbers.values(), number, count);
+                Self::Numbers(if is_series { Numbers::Row(own) } else { Numbers::One(own[0]) })
+            }
+            Self::Exact(Exact { values, shape }) => {
+                let (first, step) = if shape.is_empty() { (0, 1) } else { (number, count) };
+                let values = every(values, first, step);
+                let shape = if is_series { vec![values.len()] } else { Vec::new() };
+                Self::Exact(Exact { values, shape })
+            }
+        }
+    }
 }
 
 /// Returns the type of a variable if float64 cannot represent all of its values.

@@ -2,8 +2,8 @@
 
 use crate::arguments::in_own_unit;
 use crate::buffers::{Numbers, shape};
-use crate::exact::{Exact, exact_type};
-use fmu_run::{System, Trajectory, Value};
+use crate::exact::{Exact, Values, exact_type};
+use fmu_run::{Elements, System, Trajectory};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
@@ -15,7 +15,7 @@ pub struct Signals(Vec<Signal>);
 
 struct Signal {
     name: String,
-    values: Values,
+    source: Source,
     /// Times at which the values are given, if they are not the communication points.
     times: Option<Arc<Numbers>>,
     /// Whether there is a value for each time.
@@ -24,9 +24,8 @@ struct Signal {
     by_run: bool,
 }
 
-enum Values {
-    Numbers(Numbers),
-    Exact(Vec<Value>),
+enum Source {
+    Values(Values),
     /// The time derivative of the input with this name.
     RateOf(String),
 }
@@ -45,67 +44,36 @@ impl Signals {
             let times = own_times.as_ref().map_or(times, |times| times.values().len());
             let array = system.array(name);
             let element = array.and_then(|array| array.names.first()).unwrap_or(name);
-            if exact_type(system, element)?.is_some() {
-                let (sizes, elements) = match array {
-                    None => (&[][..], std::slice::from_ref(name)),
-                    Some(array) => (&*array.sizes, &*array.names),
-                };
-                signals.push_exact(name, sizes, Exact::of(name, &value)?, elements, (own_times, times))?;
+            let values = if exact_type(system, element)?.is_some() {
+                Values::Exact(Exact::of(name, &value)?)
+            } else if let Some(other) = rate_of(name, &value)? {
+                let (name, source) = (name.clone(), Source::RateOf(other));
+                signals.0.push(Signal { name, source, times: None, by_time: false, by_run: false });
                 continue;
-            }
-            if let Some(other) = rate_of(name, &value)? {
-                let (name, values) = (name.clone(), Values::RateOf(other));
-                signals.0.push(Signal { name, values, times: None, by_time: false, by_run: false });
-                continue;
-            }
-            let values = Numbers::of(name, &in_own_unit(system, name, &value, are_rates)?)?;
-            match array {
-                None => signals.push(name, &[], values, std::slice::from_ref(name), (own_times, times))?,
-                Some(array) => signals.push(name, &array.sizes, values, &array.names, (own_times, times))?,
-            }
+            } else {
+                Values::Numbers(Numbers::of(name, &in_own_unit(system, name, &value, are_rates)?)?)
+            };
+            signals.push(name, array, values, (own_times, times))?;
         }
         Ok(signals)
     }
 
-    /// Adds a variable whose values float64 cannot represent, or the elements of an array of this type.
-    fn push_exact(
-        &mut self,
-        name: &str,
-        sizes: &[usize],
-        given: Exact,
-        elements: &[String],
-        (own_times, times): (Option<Arc<Numbers>>, usize),
-    ) -> PyResult<()> {
-        let runs = given.shape.first().copied().unwrap_or(1);
-        let [by_time, by_run] = [&[times][..], &[runs, times]].map(|ahead| [ahead, sizes].concat());
-        given.check(name, &[&[], sizes, &by_time, &by_run])?;
-        let (by_run, is_same) = (given.shape == by_run, given.shape.is_empty());
-        let by_time = by_run || given.shape == by_time;
-        for (number, element) in elements.iter().enumerate() {
-            let (skip, step) = if is_same { (0, 1) } else { (number, elements.len()) };
-            let own = given.values.iter().skip(skip).step_by(step).cloned().collect();
-            let (name, values) = (element.clone(), Values::Exact(own));
-            self.0.push(Signal { name, values, times: own_times.clone(), by_time, by_run });
-        }
-        Ok(())
-    }
-
     /// Returns the values for the Rust interface.
     pub fn trajectories(&self) -> Vec<(&str, Trajectory<'_>)> {
-        let trajectories = self.0.iter().map(|Signal { name, values, times, by_time, by_run }| {
+        let trajectories = self.0.iter().map(|Signal { name, source, times, by_time, by_run }| {
             let times = times.as_ref().filter(|_| *by_time).map(|times| times.values());
-            let trajectory = match (values, by_time, by_run) {
-                (Values::RateOf(other), ..) => Trajectory::RateOf(other),
-                (Values::Exact(values), false, _) => Trajectory::Value(&values[0]),
-                (Values::Exact(values), true, _) => match times {
+            let trajectory = match source {
+                Source::RateOf(other) => Trajectory::RateOf(other),
+                Source::Values(Values::Exact(Exact { values, .. })) => match times {
+                    _ if !by_time => Trajectory::Value(&values[0]),
                     Some(times) => Trajectory::SampledValues { times, values },
                     None => Trajectory::Values(values),
                 },
-                (Values::Numbers(values), false, _) => Trajectory::Constant(values.values()[0]),
-                (Values::Numbers(values), true, by_run) => match (times, by_run) {
-                    (Some(times), _) => Trajectory::Sampled { times, values: values.values() },
-                    (None, false) => Trajectory::Shared(values.values()),
-                    (None, true) => Trajectory::EachRun(values.values()),
+                Source::Values(Values::Numbers(numbers)) => match (times, numbers.values()) {
+                    (_, values) if !by_time => Trajectory::Constant(values[0]),
+                    (Some(times), values) => Trajectory::Sampled { times, values },
+                    (None, values) if *by_run => Trajectory::EachRun(values),
+                    (None, values) => Trajectory::Shared(values),
                 },
             };
             (name.as_str(), trajectory)
@@ -113,16 +81,15 @@ impl Signals {
         trajectories.collect()
     }
 
-    /// Adds a numeric variable, or the elements of an array.
+    /// Adds a variable, or the elements of an array.
     fn push(
         &mut self,
         name: &str,
-        sizes: &[usize],
-        values: Numbers,
-        elements: &[String],
+        array: Option<&Elements>,
+        values: Values,
         (own_times, times): (Option<Arc<Numbers>>, usize),
     ) -> PyResult<()> {
-        let given = values.shape();
+        let (given, sizes) = (values.shape(), array.map_or(&[][..], |array| &array.sizes));
         let has_sizes = given.ends_with(sizes);
         let (by_time, by_run) = match given.len().checked_sub(sizes.len()) {
             _ if given.is_empty() => (false, false),
@@ -136,24 +103,21 @@ impl Signals {
                 let comma = if sizes.is_empty() { "," } else { "" };
                 let constant = if sizes.is_empty() { String::new() } else { format!(", {}", shape(sizes)) };
                 return Err(PyValueError::new_err(format!(
-                    "{name} has the shape {}; it must be ({of_time}{comma}), (runs, {of_time}){constant} or a number",
+                    "{name} has the shape {}; it must be ({of_time}{comma}), (runs, {of_time}){constant} or one value",
                     shape(given)
                 )));
             }
         };
-        if elements.len() == 1 && sizes.is_empty() {
-            let (name, values) = (name.to_owned(), Values::Numbers(values));
-            self.0.push(Signal { name, values, times: own_times, by_time, by_run });
-            return Ok(());
-        }
-        let all = values.values();
-        for (number, element) in elements.iter().enumerate() {
-            let own = match given.is_empty() {
-                true => all.to_vec(),
-                false => all.iter().skip(number).step_by(elements.len()).copied().collect(),
-            };
-            let (name, values) = (element.clone(), Values::Numbers(Numbers::Row(own)));
-            self.0.push(Signal { name, values, times: own_times.clone(), by_time, by_run });
+        let mut push = |name: &str, values| {
+            let (name, source, times) = (name.to_owned(), Source::Values(values), own_times.clone());
+            self.0.push(Signal { name, source, times, by_time, by_run });
+        };
+        match array {
+            None => push(name, values),
+            Some(Elements { names, .. }) => names
+                .iter()
+                .enumerate()
+                .for_each(|(number, element)| push(element, values.element(number, names.len(), by_time))),
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::arguments::{in_own_unit, items};
 use crate::buffers::{Numbers, array_of, shape};
-use crate::exact::{Exact, exact_type};
+use crate::exact::{Exact, Values, exact_type};
 use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,15 +12,9 @@ use pyo3::types::{PyDict, PyString};
 /// instance. A whole array has one value for all elements, an array, or an array for each run or instance.
 #[derive(Default)]
 pub struct Start {
-    values: Vec<(String, Value)>,
+    values: Vec<(String, Values)>,
     /// The values as Python objects, in the units of the variables. They are returned as `Runs.start`.
     given: Vec<(String, Py<PyAny>)>,
-}
-
-enum Value {
-    Numbers(Numbers),
-    /// Strings, bytes or 64-bit integers: one for all runs or instances, or one for each.
-    Exact(Exact),
 }
 
 impl Start {
@@ -55,13 +49,13 @@ impl Start {
             let of = Exact::of(&name, &value)?;
             let count = of.shape.first().copied().unwrap_or(1);
             of.check(&format!("the start value of {name}"), &[&[], &[count]])?;
-            self.values.push((name.clone(), Value::Exact(of)));
+            self.values.push((name.clone(), Values::Exact(of)));
             self.given.push((name, value.unbind()));
             return Ok(());
         }
         let value = in_own_unit(system, &name, &value, false)?;
         match system.array(&name) {
-            None => self.values.push((name.clone(), Value::of(&name, &value)?)),
+            None => self.values.push((name.clone(), values_of(&name, &value)?)),
             Some(array) => self.add_array(system, &name, array, &value)?,
         }
         self.given.push((name, value.unbind()));
@@ -70,7 +64,7 @@ impl Start {
 
     /// Returns the values for the Rust interface.
     pub fn values(&self) -> Vec<(&str, fmu_run::Start<'_>)> {
-        self.values.iter().map(|(name, of)| (name.as_str(), of.value())).collect()
+        self.values.iter().map(|(name, of)| (name.as_str(), start(of))).collect()
     }
 
     /// Returns the names of the variables or arrays that have a start value.
@@ -101,25 +95,16 @@ impl Start {
         // Strings are names of enumeration items, or "true" and "false".
         let is_text =
             || array_of(name, value).is_err() && Exact::of(name, value).is_ok_and(|of| of.is_text());
-        if is_exact || is_text() {
-            let of = Exact::of(name, value)?;
-            let by_run = check_shape(name, &of.shape, array)?;
-            for (number, element) in array.names.iter().enumerate() {
-                let values =
-                    if of.shape.is_empty() { of.values.clone() } else { every(&of.values, number, count) };
-                let shape = if by_run { vec![values.len()] } else { Vec::new() };
-                self.values.push((element.clone(), Value::Exact(Exact { values, shape })));
-            }
-            return Ok(());
-        }
-        let numbers = Numbers::of(name, value)?;
-        let by_run = check_shape(name, numbers.shape(), array)?;
-        for (number, element) in array.names.iter().enumerate() {
-            let all = numbers.values();
-            let own = if numbers.shape().is_empty() { all.to_vec() } else { every(all, number, count) };
-            let own = if by_run { Numbers::Row(own) } else { Numbers::One(own[0]) };
-            self.values.push((element.clone(), Value::Numbers(own)));
-        }
+        let values = if is_exact || is_text() {
+            Values::Exact(Exact::of(name, value)?)
+        } else {
+            Values::Numbers(Numbers::of(name, value)?)
+        };
+        let by_run = check_shape(name, values.shape(), array)?;
+        let elements = array.names.iter().enumerate();
+        self.values.extend(
+            elements.map(|(number, element)| (element.clone(), values.element(number, count, by_run))),
+        );
         Ok(())
     }
 }
@@ -139,33 +124,28 @@ fn check_shape(name: &str, given: &[usize], array: &Elements) -> PyResult<bool> 
     )))
 }
 
-/// Returns every `step`-th value from `first` on.
-fn every<T: Clone>(values: &[T], first: usize, step: usize) -> Vec<T> {
-    values.iter().skip(first).step_by(step).cloned().collect()
+/// Returns the start value for the Rust interface.
+fn start(values: &Values) -> fmu_run::Start<'_> {
+    match values {
+        Values::Numbers(Numbers::One(number)) => fmu_run::Start::Same(*number),
+        Values::Numbers(numbers) => fmu_run::Start::Each(numbers.values()),
+        Values::Exact(of) if of.shape.is_empty() => fmu_run::Start::Value(&of.values[0]),
+        Values::Exact(of) => fmu_run::Start::EachValue(&of.values),
+    }
 }
 
-impl Value {
-    fn value(&self) -> fmu_run::Start<'_> {
-        match self {
-            Self::Numbers(Numbers::One(number)) => fmu_run::Start::Same(*number),
-            Self::Numbers(numbers) => fmu_run::Start::Each(numbers.values()),
-            Self::Exact(of) if of.shape.is_empty() => fmu_run::Start::Value(&of.values[0]),
-            Self::Exact(of) => fmu_run::Start::EachValue(&of.values),
-        }
+/// Converts the start value of a variable that is a number. Strings are Booleans and items of enumerations.
+fn values_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Values> {
+    if value.is_instance_of::<PyString>() || value.extract::<Vec<String>>().is_ok() {
+        return Ok(Values::Exact(Exact::of(name, value)?));
     }
-
-    fn of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if value.is_instance_of::<PyString>() || value.extract::<Vec<String>>().is_ok() {
-            return Ok(Self::Exact(Exact::of(name, value)?));
-        }
-        let numbers = Numbers::of(name, value)?;
-        match numbers.shape() {
-            [] | [_] => Ok(Self::Numbers(numbers)),
-            given => Err(PyValueError::new_err(format!(
-                "the start value of {name} has the shape {}; it must be one number for all runs or instances, or (n,) with one number \
-                for each",
-                shape(given)
-            ))),
-        }
+    let numbers = Numbers::of(name, value)?;
+    match numbers.shape() {
+        [] | [_] => Ok(Values::Numbers(numbers)),
+        given => Err(PyValueError::new_err(format!(
+            "the start value of {name} has the shape {}; it must be one number for all runs or instances, or (n,) with one number \
+            for each",
+            shape(given)
+        ))),
     }
 }

@@ -1,5 +1,6 @@
 //! Statistics of trajectories, calculated during a run.
 
+use crate::error::named;
 use std::str::FromStr;
 
 /// A statistic of a trajectory over all times, including times whose values are not kept. If a value is NaN, all statistics except
@@ -39,11 +40,7 @@ impl FromStr for Measure {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().find(|(known, _)| *known == name);
-        found.map(|(_, measure)| *measure).ok_or_else(|| {
-            let names = Self::ALL.map(|(known, _)| known).join(", ");
-            format!("there is no measure {name:?}; there are {names}")
-        })
+        named(&Self::ALL, "measure", name)
     }
 }
 

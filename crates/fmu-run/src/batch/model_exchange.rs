@@ -33,7 +33,7 @@ impl<'a> Worker<'a> {
         model.parts().instance.forget_log();
         let sizes = [description.states, description.event_indicators];
         let mut simulation = Simulation::new(times, sizes, integration, *rtol, *reports_steps);
-        let mut kept = Kept::default();
+        let mut kept = Kept::of(plan);
         let mut observed = Observed { worker: self, times, trajectories, kept: &mut kept, run, before: None };
         let result = simulation.run(&model, &mut observed);
         result.map_err(|rejection| {

@@ -3,9 +3,9 @@
 use super::Finished;
 use super::plan::Plan;
 use super::pulse::Pulse;
-use super::watch::{Watch, lock};
+use super::watch::Watch;
 use super::worker::{Exact, Failure, Worker};
-use crate::error::{Error, caught};
+use crate::error::{Error, caught, lock};
 use crate::system::System;
 use fmi_abi::Value;
 use std::sync::atomic::Ordering;
@@ -40,7 +40,7 @@ pub(super) fn run(
     let rows = split(trajectories, trajectory).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (trajectories, measures))| Row { run, trajectories, measures }));
-    let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let next = || lock(&rows).next();
     let feed = watch.listening.then(|| watch.feed.get_or_init(|| system.feed()));
     let found = on_threads(system, plan.threads, watch, |number| {
         let mut worker = Worker::new(system, plan, watch, number, None);
@@ -132,7 +132,7 @@ fn repeat_with_logging(
     failures: &mut [(usize, Failure)],
 ) -> Result<(), Error> {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
-    let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let next = || lock(&silent).next();
     let repeated = on_threads(system, plan.threads, watch, |number| {
         let mut worker = Worker::new(system, plan, watch, number, Some(until));
         let mut trajectories = vec![0.0; plan.outputs.len() * plan.stored_times()];

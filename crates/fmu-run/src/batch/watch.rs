@@ -1,9 +1,10 @@
 //! Lets the caller observe and cancel runs.
 
+use crate::error::lock;
 use crate::messages::{Feed, Logged};
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Function that is called about ten times per second.
 type OnPulse = Box<dyn Fn(&Watch) + Send + Sync>;
@@ -86,8 +87,4 @@ impl Watch {
             pulse(self);
         }
     }
-}
-
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

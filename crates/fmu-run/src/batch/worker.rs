@@ -5,7 +5,8 @@ use super::input_rows::InputRows;
 use super::measure::Measured;
 use super::plan::Plan;
 use super::pulse::Pulse;
-use super::watch::{Watch, lock};
+use super::watch::Watch;
+use crate::error::lock;
 use crate::instance::Experiment;
 use crate::messages::{Feed, Logging};
 use crate::system::System;
@@ -60,11 +61,20 @@ pub(super) struct Worker<'a> {
     measured: Measured,
 }
 
-/// Position in the trajectories of a run: index of the next stored value, and number of communication points until then.
-#[derive(Default)]
+/// Position in the trajectories of a run.
 pub(super) struct Kept {
+    /// Length of a trajectory.
+    length: usize,
+    /// Index of the next stored value.
     index: usize,
+    /// Number of communication points until then.
     wait: usize,
+}
+
+impl Kept {
+    pub fn of(plan: &Plan) -> Self {
+        Self { length: plan.stored_times(), index: 0, wait: 0 }
+    }
 }
 
 /// Index of the last communication point before a run stopped, and the time that it reached, s (`None` if the initialization failed);
@@ -215,50 +225,23 @@ impl<'a> Worker<'a> {
         let plan = self.plan;
         self.start(instance, run).map_err(|rejection| (None, rejection))?;
         instance.forget_log();
-        let measures = !plan.measures.is_empty();
-        // Length of a stored trajectory, index of its next value, and number of communication points until then.
-        let (kept, mut index, mut wait) = (plan.stored_times(), 0, 0);
+        let mut kept = Kept::of(plan);
         let mut ended: Option<Rejection> = None;
         for (k, &time) in times.iter().enumerate() {
             let at = |rejection| (Some((k, time)), rejection);
-            if self.is_caller && self.pulse.is_due() {
-                self.watch.pulse();
-            }
-            if self.watch.is_cancelled() {
+            if !self.proceeds() {
                 return Ok(());
             }
             self.report_time(run, time);
-            if let Some(deadline) = self.deadline {
+            if self.is_repeated() {
                 // Drops messages about earlier steps, so that they do not become the reason of a later error.
                 instance.forget_log();
-                if time::Instant::now() > deadline {
-                    return Ok(());
-                }
             }
             if !plan.read_before_set && ended.is_none() {
                 self.set_inputs(instance, k).map_err(at)?;
             }
-            let keep = wait == 0 && index < kept;
-            if (keep || measures)
-                && let Err(rejection) = instance.get(&plan.outputs, &mut self.row)
-            {
+            if let Err(rejection) = self.record(instance, &mut kept, time, trajectories) {
                 return Err(at(ended.unwrap_or(rejection)));
-            }
-            if keep {
-                // Avoids `chunks`, which would calculate the number of chunks each time.
-                for (output, value) in self.row.iter().enumerate() {
-                    trajectories[output * kept + index] = *value;
-                }
-                for (_, target) in &plan.exact_outputs {
-                    let value = instance.get_value(*target);
-                    self.exact_of_run.push(value.map_err(|rejection| at(ended.take().unwrap_or(rejection)))?);
-                }
-                index += 1;
-                wait = plan.every.unwrap_or(1);
-            }
-            wait = wait.saturating_sub(1);
-            if measures {
-                self.measured.add(time, &self.row);
             }
             self.reached = k + 1;
             if let Some(ended) = ended {
@@ -285,7 +268,8 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Calls the pulse if it is due. Returns whether the run continues. Called after each step in Model Exchange.
+    /// Calls the pulse if it is due. Returns whether the run continues.
+    #[inline(always)]
     pub fn proceeds(&mut self) -> bool {
         if self.is_caller && self.pulse.is_due() {
             self.watch.pulse();
@@ -293,7 +277,9 @@ impl<'a> Worker<'a> {
         !self.watch.is_cancelled() && self.deadline.is_none_or(|deadline| time::Instant::now() <= deadline)
     }
 
-    /// Reads the outputs at a communication point in Model Exchange.
+    /// Reads the outputs at a communication point. Stores them in the trajectories if it is one of the stored times, and adds them to the
+    /// statistics.
+    #[inline(always)]
     pub fn record(
         &mut self,
         instance: &mut SystemInstance,
@@ -301,33 +287,26 @@ impl<'a> Worker<'a> {
         time: f64,
         trajectories: &mut [f64],
     ) -> Result<(), Rejection> {
-        let plan = self.plan;
-        instance.get(&plan.outputs, &mut self.row)?;
-        if self.keep_row(kept, time, trajectories) {
+        let (plan, measures) = (self.plan, !self.plan.measures.is_empty());
+        let is_kept = kept.wait == 0 && kept.index < kept.length;
+        if is_kept || measures {
+            instance.get(&plan.outputs, &mut self.row)?;
+        }
+        if is_kept {
+            // Avoids `chunks`, which would calculate the number of chunks each time.
+            for (output, value) in self.row.iter().enumerate() {
+                trajectories[output * kept.length + kept.index] = *value;
+            }
             for (_, target) in &plan.exact_outputs {
                 self.exact_of_run.push(instance.get_value(*target)?);
             }
-        }
-        Ok(())
-    }
-
-    /// Stores the outputs of a communication point in the trajectories, if it is one of the stored times, and adds them to the
-    /// statistics. Returns whether it is a stored time.
-    pub fn keep_row(&mut self, kept: &mut Kept, time: f64, trajectories: &mut [f64]) -> bool {
-        let (plan, length) = (self.plan, self.plan.stored_times());
-        let keeps = kept.wait == 0 && kept.index < length;
-        if keeps {
-            for (output, value) in self.row.iter().enumerate() {
-                trajectories[output * length + kept.index] = *value;
-            }
-            kept.index += 1;
-            kept.wait = plan.every.unwrap_or(1);
+            (kept.index, kept.wait) = (kept.index + 1, plan.every.unwrap_or(1));
         }
         kept.wait = kept.wait.saturating_sub(1);
-        if !plan.measures.is_empty() {
+        if measures {
             self.measured.add(time, &self.row);
         }
-        keeps
+        Ok(())
     }
 
     pub fn experiment(&self) -> Experiment {

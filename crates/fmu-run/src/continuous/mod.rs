@@ -15,7 +15,7 @@ pub(crate) use inputs::{Curve, Signals, Slopes};
 pub(crate) use model::Model;
 pub(crate) use simulation::{Hooks, Simulation};
 
-use crate::error::{Error, request};
+use crate::error::{Error, named, request};
 use std::str::FromStr;
 
 /// Method for integrating an FMU in Model Exchange.
@@ -50,11 +50,7 @@ impl FromStr for Solver {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().find(|(known, _)| *known == name);
-        found.map(|(_, solver)| *solver).ok_or_else(|| {
-            let names = Self::ALL.map(|(known, _)| known).join(", ");
-            format!("there is no solver {name:?}; there are {names}")
-        })
+        named(&Self::ALL, "solver", name)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, each};
 use super::{Instances, Mask};
-use crate::error::{Error, request};
+use crate::error::{Error, lock, request};
 use crate::system_instance::Saved;
 
 /// States that [`Instances`] have saved, one for each instance that had not failed. They contain indices instead of pointers, so
@@ -31,7 +31,7 @@ impl Instances {
         let indices = std::sync::Mutex::new(&mut states);
         self.alive(None, |index, progress, instance| {
             let saved = (instance.save()?, progress.time);
-            indices.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] = Some(saved);
+            lock(&indices)[index] = Some(saved);
             Ok(())
         });
         Ok(States(states))

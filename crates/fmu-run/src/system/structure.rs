@@ -4,8 +4,8 @@ use crate::description::{Attributes, Description};
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
 use crate::start::{exact, number_of};
-use fmi_abi::{Causality, Value};
 use fmi_abi::write::{Element, unzip};
+use fmi_abi::{Causality, Value};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
