@@ -1,13 +1,15 @@
 #![doc = include_str!("../README.md")]
+// Under Miri, the log callback is variadic as in C.
+#![cfg_attr(all(miri, feature = "calls"), feature(c_variadic))]
 
 mod base_type;
 pub mod c_types;
 #[cfg(feature = "calls")]
-#[allow(unsafe_code, reason = "it calls functions through their addresses")]
+#[allow(unsafe_code, reason = "it calls FMUs and receives their messages")]
 pub mod calls;
 mod causality;
 #[cfg(feature = "client")]
-#[allow(unsafe_code, reason = "it calls FMUs and receives their messages")]
+#[allow(unsafe_code, reason = "it calls FMUs")]
 pub mod client;
 #[cfg(feature = "description")]
 pub mod description;
@@ -76,59 +78,7 @@ macro_rules! table {
         impl Functions {
             /// The names of all functions.
             pub const NAMES: &[&str] = &[$(stringify!($free),)+ $(stringify!($function),)+];
-
-            /// Finds the functions of a library by their names. `symbol` returns the address of the function with the
-            /// given name, or `None` if the library lacks it. A missing function is replaced by one that returns Error,
-            /// a null pointer or nothing, as its type requires.
-            ///
-            /// # Safety
-            /// Each address that `symbol` returns is the address of the function of that name, whose type is as in the
-            /// FMI standard. The library stays loaded while the functions are used.
-            #[allow(unsafe_code)]
-            pub unsafe fn find(mut symbol: impl FnMut(&'static str) -> Option<*const $crate::c_types::c_void>) -> Self {
-                Self {
-                    $($free: match symbol(stringify!($free)) {
-                        // SAFETY: the caller guarantees the type.
-                        Some(found) => unsafe { std::mem::transmute::<*const _, unsafe extern "C" fn($($free_type),*) -> $result>(found) },
-                        None => {
-                            unsafe extern "C" fn absent($(_: $free_type),*) -> $result {
-                                $crate::Absent::RESULT
-                            }
-                            absent
-                        }
-                    },)+
-                    $($function: match symbol(stringify!($function)) {
-                        // SAFETY: the caller guarantees the type.
-                        Some(found) => unsafe {
-                            std::mem::transmute::<*const _, unsafe extern "C" fn($handle $(, $type)*) -> $crate::c_types::c_int>(found)
-                        },
-                        None => {
-                            unsafe extern "C" fn absent(_: $handle $(, _: $type)*) -> $crate::c_types::c_int {
-                                $crate::Status::Error as _
-                            }
-                            absent
-                        }
-                    },)+
-                }
-            }
         }
     };
 }
 pub(crate) use table;
-
-/// Result of the function that replaces a missing one, for each result type other than a status.
-trait Absent {
-    const RESULT: Self;
-}
-
-impl Absent for () {
-    const RESULT: Self = ();
-}
-
-impl Absent for *mut c_types::c_void {
-    const RESULT: Self = std::ptr::null_mut();
-}
-
-impl Absent for *const c_types::c_char {
-    const RESULT: Self = std::ptr::null();
-}

@@ -5,7 +5,7 @@ use crate::call_monitor::CallMonitor;
 use crate::table::Table;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
-use fmi_abi::client::{Functions, Library};
+use fmi_abi::calls::{Functions, Library};
 use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
 use std::collections::HashSet;
 use std::ffi::{CStr, CString};
@@ -37,7 +37,6 @@ pub struct LoadedModel {
     /// The directory with the files that the model reads.
     resources: Option<CString>,
     pub(crate) monitor: Arc<CallMonitor>,
-    _library: Option<libloading::Library>,
 }
 
 /// The variables of a type.
@@ -56,8 +55,11 @@ impl LoadedModel {
     /// # Errors
     /// When the description cannot be read.
     pub unsafe fn new(description: &str, fmi2: fmi2::Functions, fmi3: fmi3::Functions) -> Result<Self> {
+        let functions = [Functions::Fmi2(Box::new(fmi2)), Functions::Fmi3(Box::new(fmi3))];
+        // SAFETY: functions in this program stay loaded.
+        let functions = functions.map(|functions| unsafe { Library::of(functions) });
         // SAFETY: the caller guarantees it.
-        unsafe { Self::with(description, fmi2, fmi3, None, None, Arc::default()) }
+        unsafe { Self::with(description, functions, None, Arc::default()) }
     }
 
     /// Loads the model of a shared library for this machine. The model may read the files in the directory `resources`,
@@ -92,7 +94,9 @@ impl LoadedModel {
         }
         let path_of = || path.display().to_string();
         // SAFETY: the caller guarantees it, here and below.
-        let library = unsafe { libloading::Library::new(path) }.with_context(path_of)?;
+        let load = |standard| unsafe { Library::load(path, standard) }.with_context(path_of);
+        let libraries = [load(Standard::Fmi2)?, load(Standard::Fmi3)?];
+        let [library, _] = &libraries;
         let resources = resources.and_then(|path| path.canonicalize().ok());
         let resources = resources
             .map(|path| CString::new(path.to_string_lossy().into_owned()))
@@ -101,23 +105,21 @@ impl LoadedModel {
         let mut description = Vec::new();
         // SAFETY: the FMI functions have the types of the standard, and `describe` has the type that fmu-export declares;
         // `keep` receives a pointer to a vector, which exists during the call; `directory` is a string or NULL.
-        let (fmi2, fmi3) = unsafe {
-            let symbol = |name: &str| library.get::<*const c_void>(name).ok().map(|found| *found);
+        unsafe {
             let mut names = fmi2::Functions::NAMES.iter().chain(fmi3::Functions::NAMES);
             ensure!(
-                names.all(|name| symbol(name).is_some()),
+                names.all(|name| library.find(name).is_ok()),
                 "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
                 path.display()
             );
-            let (fmi2, fmi3) = (fmi2::Functions::find(symbol), fmi3::Functions::find(symbol));
-            let describe = library.get::<Describe>(DESCRIPTION).with_context(|| {
+            let describe = library.function::<Describe>(DESCRIPTION).with_context(|| {
                 format!(
                     "{} does not describe itself: its fmu-export is older than fmu-package {}; use the same version of both",
                     path.display(),
                     env!("CARGO_PKG_VERSION")
                 )
             })?;
-            if let Ok(report_panics) = library.get::<ReportPanics>(PANICS) {
+            if let Ok(report_panics) = library.function::<ReportPanics>(PANICS) {
                 // The library may report a panic at any time, so this value is never freed.
                 let context = Arc::into_raw(Arc::clone(&monitor)).cast_mut().cast();
                 report_panics(CallMonitor::receive, context);
@@ -128,40 +130,31 @@ impl LoadedModel {
             describe(directory, keep, (&raw mut description).cast());
             monitor.end();
             monitor.check()?;
-            (fmi2, fmi3)
-        };
+        }
         let description = std::str::from_utf8(&description)?;
         // SAFETY: the functions belong to the library, and so does the description.
-        unsafe { Self::with(description, fmi2, fmi3, resources, Some(library), monitor) }
-            .with_context(path_of)
+        unsafe { Self::with(description, libraries, resources, monitor) }.with_context(path_of)
     }
 
     /// # Safety
-    /// The functions belong to the model that is described, and the library contains them if there is one.
+    /// The functions belong to the model that is described.
     unsafe fn with(
         description: &str,
-        fmi2: fmi2::Functions,
-        fmi3: fmi3::Functions,
+        libraries: [Library; 2],
         resources: Option<CString>,
-        library: Option<libloading::Library>,
         monitor: Arc<CallMonitor>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
-        let functions = [Functions::Fmi2(Box::new(fmi2)), Functions::Fmi3(Box::new(fmi3))];
-        // SAFETY: the caller guarantees that the functions belong to a model of fmu-export; this value keeps them loaded, and
-        // instances borrow it.
-        let functions = functions.map(|functions| Arc::new(unsafe { Library::of(functions) }));
         let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
         Ok(Self {
             table,
-            functions,
+            functions: libraries.map(Arc::new),
             groups,
             starts: OnceLock::new(),
             compared: Mutex::default(),
             resources,
             monitor,
-            _library: library,
         })
     }
 

@@ -20,7 +20,7 @@ impl Library {
     /// Loads a library.
     ///
     /// # Safety
-    /// The requirement of [`fmi_abi::client::Library::load`].
+    /// The requirement of [`fmi_abi::client::load`].
     pub unsafe fn load(
         path: &Path,
         standard: Standard,
@@ -28,7 +28,7 @@ impl Library {
         files: Arc<Files>,
     ) -> Result<Self, impl std::error::Error> {
         // SAFETY: the caller guarantees that loading is sound.
-        let client = unsafe { fmi_abi::client::Library::load(path, standard) };
+        let client = unsafe { fmi_abi::client::load(path, standard) };
         client.map(|client| Self { client: Arc::new(client), resources, _files: files })
     }
 }

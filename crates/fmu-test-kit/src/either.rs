@@ -4,7 +4,6 @@ use crate::fmi2;
 use crate::fmi3::{self, Stepped};
 use crate::importer::{Arguments, Hook, Log, Message, lock, to_bool};
 use crate::library::functions_of;
-use fmi_abi::calls;
 use fmi_abi::fmi2::types::fmi2EventInfo;
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi3::reference;
@@ -184,12 +183,14 @@ pub trait Either: Send {
     /// # Panics
     /// Panics if the FMI version has no function of this name.
     unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-        let (address, instance) = match self.version() {
-            Version::Fmi2(fmu) => (fmu.address_of(name), fmu.instance()),
-            Version::Fmi3(fmu) => (fmu.address_of(name), fmu.instance()),
+        // SAFETY: the instance is NULL or alive; the caller guarantees the arguments.
+        let code = unsafe {
+            match self.version() {
+                Version::Fmi2(fmu) => fmu.functions().call(name, fmu.instance(), words),
+                Version::Fmi3(fmu) => fmu.functions().call(name, fmu.instance(), words),
+            }
         };
-        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
-        Status::from_c(unsafe { calls::call(address, name, instance, words) })
+        Status::from_c(code.unwrap_or_else(|| panic!("there is no function {name}")))
     }
 
     /// Calls the function of this name with all arguments 0 or NULL.

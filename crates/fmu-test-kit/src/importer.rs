@@ -1,8 +1,11 @@
 //! An instance as an importer uses it. Its methods are generated from the list of functions of an FMI version.
 
-use fmi_abi::c_types::{c_char, c_int, c_void};
-use fmu_export::{Category, Exported, Interface, Status};
+use fmi_abi::c_types::c_void;
+use fmi_abi::calls::{Instantiation, LogMessage, LogReceiver, callbacks, log_callback, string};
+use fmu_export::{Category, Exported, Interface, Standard, Status};
 use std::ffi::{CStr, CString};
+use std::hint::black_box;
+use std::ptr::{null, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A log message that the importer received.
@@ -59,32 +62,22 @@ impl std::fmt::Debug for Log {
     }
 }
 
-/// Stores a message.
-///
-/// # Safety
-/// The environment is NULL or a live `Log`; the strings are NULL or valid.
-pub(crate) unsafe fn remember(
-    environment: *mut c_void,
-    instance_name: *const c_char,
-    status: c_int,
-    category: *const c_char,
-    message: *const c_char,
-) {
-    // SAFETY: the caller guarantees NULL or a string.
-    let string = |pointer: *const c_char| match unsafe { pointer.as_ref() } {
-        // SAFETY: the pointer is not NULL, so it is a string.
-        Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
-        None => String::new(),
-    };
-    let status = Status::from_c(status);
-    let [instance_name, category, message] = [instance_name, category, message].map(string);
-    // SAFETY: NULL, or the `Log` that was passed with the logger and lives as long as the instance.
-    if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        lock(&log.messages).push(Message { instance_name, status, category, message });
-        let hook = lock(&log.hook).take();
-        if let Some(mut hook) = hook {
-            hook();
-            *lock(&log.hook) = Some(hook);
+/// The environment of each message must be NULL or a live `Log`.
+impl LogReceiver for Log {
+    unsafe fn receive(message: LogMessage) {
+        // SAFETY: the caller guarantees NULL or a string.
+        let owned = |pointer| unsafe { string(pointer) }.unwrap_or_default().to_string_lossy().into_owned();
+        let LogMessage { environment, instance_name, category, text, .. } = message;
+        let status = Status::from_c(message.status);
+        let [instance_name, category, message] = [instance_name, category, text].map(owned);
+        // SAFETY: NULL, or the `Log` that was passed with the logger and lives as long as the instance.
+        if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
+            lock(&log.messages).push(Message { instance_name, status, category, message });
+            let hook = lock(&log.hook).take();
+            if let Some(mut hook) = hook {
+                hook();
+                *lock(&log.hook) = Some(hook);
+            }
         }
     }
 }
@@ -139,6 +132,56 @@ impl Arguments<'static> {
     }
 }
 
+impl Arguments<'_> {
+    /// Calls an instantiation function with these arguments. Afterwards overwrites the callbacks structure and the instance name,
+    /// because the FMU must have copied them.
+    pub(crate) fn instantiate(
+        &self,
+        standard: Standard,
+        log: &Log,
+        instantiate: impl FnOnce(&Instantiation) -> *mut c_void,
+    ) -> *mut c_void {
+        let pointer = |string: Option<&CStr>| string.map_or(null(), CStr::as_ptr);
+        let mut name = self.instance_name.map(|name| name.to_bytes_with_nul().to_vec());
+        let environment = if self.environment { (&raw const *log).cast_mut().cast() } else { null_mut() };
+        let mut callbacks = callbacks::<Log>(environment);
+        callbacks.logger = callbacks.logger.filter(|_| self.logger);
+        // NULL is allowed, because FMUs of fmu-export have `canNotUseMemoryManagementFunctions`.
+        (callbacks.allocate_memory, callbacks.free_memory) = (None, None);
+        // FMI 3.0 needs a path, not a URI.
+        let resources = self.resource_location.map(|location| match standard {
+            Standard::Fmi2 => location,
+            Standard::Fmi3 => {
+                let bytes = location.to_bytes_with_nul();
+                CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes))
+                    .expect("the terminating NUL is kept")
+            }
+        });
+        let instance = instantiate(&Instantiation {
+            interface: self.fmu_type,
+            name: name.as_ref().map_or(null(), |name| name.as_ptr().cast()),
+            token: pointer(self.guid.as_deref()),
+            resources: pointer(resources),
+            visible: self.visible.into(),
+            logging_on: self.logging_on,
+            callbacks: if self.callbacks { &raw const callbacks } else { null() },
+            environment,
+            log: self.logger.then_some(log_callback::<Log>()),
+            event_mode_used: self.event_mode_used,
+            early_return_allowed: self.early_return_allowed,
+            required_intermediate_variables: self.required_intermediate_variables.as_ptr(),
+            required_count: self.required_intermediate_variables.len(),
+        });
+        callbacks.logger = None;
+        callbacks.component_environment = null_mut();
+        if let Some(name) = &mut name {
+            name.fill(b'X');
+        }
+        black_box((&callbacks, &name));
+        instance
+    }
+}
+
 /// Converts a Boolean that an FMI function wrote. Panics if its integer value is neither 0 nor 1.
 #[track_caller]
 pub(crate) fn to_bool(flag: i32) -> bool {
@@ -146,12 +189,11 @@ pub(crate) fn to_bool(flag: i32) -> bool {
     flag == 1
 }
 
-/// Defines the importer of an FMI version. The calling module provides `make`, which calls the instantiation
-/// functions.
+/// Defines the importer of an FMI version.
 macro_rules! importer {
     (
         $free_instance:ident;
-        $_standard:ident $handle:ident
+        $standard:ident $handle:ident
         without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
         with an instance {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
@@ -183,7 +225,10 @@ macro_rules! importer {
             /// Returns the log messages if instantiation fails.
             pub fn instantiate(functions: Functions, arguments: &Arguments) -> Result<Self, Vec<Message>> {
                 let log = std::sync::Arc::<Log>::default();
-                let instance = make(&functions, arguments, &log);
+                let instance = arguments.instantiate(Standard::$standard, &log, |arguments| {
+                    // SAFETY: each pointer is NULL or points to a live value.
+                    unsafe { functions.instantiate(arguments) }
+                });
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
             }
 
@@ -228,13 +273,6 @@ macro_rules! importer {
                     Status::from_c(unsafe { (self.functions.$function)(self.instance $(, $argument)*) })
                 }
             )+
-
-            pub(crate) fn address_of(&self, name: &str) -> *const c_void {
-                match name {
-                    $(stringify!($function) => self.functions.$function as *const c_void,)+
-                    _ => panic!("there is no function {name}"),
-                }
-            }
         }
 
         /// Names of the functions that take an instance.

@@ -12,9 +12,6 @@
 //! * [`load`] and [`functions_of`] return the functions of an FMU's library, [`instructions()`] counts the instructions of
 //!   some work, and [`Random`] generates numbers.
 
-// Under Miri, the log callback is variadic as in C; see `fmi2`.
-#![cfg_attr(miri, feature(c_variadic))]
-
 pub mod c_models;
 pub mod c_programs;
 pub mod checks;

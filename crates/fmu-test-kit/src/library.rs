@@ -1,8 +1,8 @@
 //! The shared library of an FMU, loaded until the program ends.
 
-use fmi_abi::c_types::c_void;
+use fmi_abi::calls::{Library, LoadError};
 use fmi_abi::fmi2::Functions;
-use fmu_export::Exported;
+use fmu_export::{Exported, Standard};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -15,16 +15,14 @@ use std::sync::OnceLock;
 ///
 /// # Errors
 /// Fails if the library cannot be loaded, or lacks a function; the message names the function.
-pub unsafe fn load(path: &Path) -> Result<Functions, libloading::Error> {
+pub unsafe fn load(path: &Path) -> Result<Functions, LoadError> {
     // SAFETY: the caller guarantees that loading is sound.
-    let library = Box::leak(Box::new(unsafe { libloading::Library::new(path) }?));
-    // SAFETY: the symbol is only looked up.
-    let symbol = |name: &str| unsafe { library.get::<*const c_void>(name) }.map(|found| *found);
+    let library = Box::leak(Box::new(unsafe { Library::load(path, Standard::Fmi2) }?));
     for name in Functions::NAMES {
-        symbol(name)?;
+        library.find(name)?;
     }
     // SAFETY: the caller guarantees the types of the functions; the library is never unloaded.
-    Ok(unsafe { Functions::find(|name| symbol(name).ok()) })
+    Ok(unsafe { Functions::find(|name| library.find(name).ok()) })
 }
 
 /// Returns the functions of a model in this program, or of the library that the environment variable `FMU_LIBRARY` names.

@@ -4,7 +4,6 @@
 //! conversion is expanded only if that is harmless: numbers are copied from registers and the stack, and strings are read through
 //! the kernel, which reports invalid pointers (only on Linux; elsewhere `%s` stays in the text). `%n`, which would write to memory,
 //! and unknown conversions stay in the text.
-#![cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
 
 use std::ffi::{CStr, CString};
 

@@ -2,11 +2,11 @@
 //! calls: they check lengths, keep the library loaded, and do not call the instance after a fatal error.
 
 use super::float::keeping_environment;
-use super::library::{Functions, Library};
-use super::log::{Log, LogListener, VariableNames, callbacks, log_of_fmi3};
+use super::log::{Log, LogListener, VariableNames};
 use super::rejection::{Message, Rejection};
 use super::saved::States;
 use crate::c_types::{c_int, c_void};
+use crate::calls::{Functions, Instantiation, Library, callbacks, log_callback};
 use crate::fmi2::types::*;
 use crate::fmi3::types::*;
 use crate::{Interface, Standard, Status};
@@ -122,12 +122,7 @@ impl Drop for Instance {
         if !self.handle.is_null() {
             self.forget_all();
             // SAFETY: the library made the instance, which is freed only here.
-            keeping_environment(|| unsafe {
-                match &self.library.functions {
-                    Functions::Fmi2(functions) => (functions.fmi2FreeInstance)(self.handle),
-                    Functions::Fmi3(functions) => (functions.fmi3FreeInstance)(self.handle),
-                }
-            });
+            keeping_environment(|| unsafe { self.library.functions().free(self.handle) });
         }
         // Comes last, because freeing the instance may log messages.
         self.log.unregister();
@@ -141,7 +136,7 @@ macro_rules! call {
         // SAFETY: the instance is alive; array arguments are slices with the passed lengths, and single
         // values are live references.
         let (function, code) = unsafe {
-            match &$self.library.functions {
+            match $self.library.functions() {
                 Functions::Fmi2(of) => (stringify!($fmi2), (of.$fmi2)(handle $(, $of_fmi2)*)),
                 $(Functions::Fmi3(of) => (stringify!($fmi3), (of.$fmi3)(handle $(, $of_fmi3)*)),)?
                 #[allow(unreachable_patterns, reason = "where FMI 3.0 has the function")]
@@ -154,7 +149,7 @@ macro_rules! call {
         let handle = $self.handle(stringify!($fmi3))?;
         // SAFETY: as above.
         let code = unsafe {
-            match &$self.library.functions {
+            match $self.library.functions() {
                 Functions::Fmi2(_) => crate::Status::Error as c_int,
                 Functions::Fmi3(of) => (of.$fmi3)(handle $(, $of_fmi3)*),
             }
@@ -171,57 +166,27 @@ impl Instance {
     /// # Errors
     /// The FMU returns NULL. The error contains the FMU's messages.
     pub fn new(library: &Arc<Library>, settings: &Settings) -> Result<Self, Rejection> {
-        let Settings { interface, logging_on, event_mode, early_return, .. } = *settings;
         let log = Log::register(settings.listener.clone(), settings.names.clone());
         let environment = log.environment();
-        let [own_name, token] =
+        let [name, token] =
             [settings.name, settings.token].map(|text| CString::new(text).unwrap_or_default());
-        let (name, token) = (own_name.as_ptr(), token.as_ptr());
-        let resources = settings.resources.map_or(null(), CStr::as_ptr);
-        let callbacks = Box::new(callbacks(environment));
+        let callbacks = Box::new(callbacks::<Log>(environment));
+        let arguments = Instantiation {
+            interface: settings.interface as c_int,
+            name: name.as_ptr(),
+            token: token.as_ptr(),
+            resources: settings.resources.map_or(null(), CStr::as_ptr),
+            logging_on: settings.logging_on.into(),
+            callbacks: &raw const *callbacks,
+            environment,
+            log: Some(log_callback::<Log>()),
+            event_mode_used: settings.event_mode.into(),
+            early_return_allowed: settings.early_return.into(),
+            ..Instantiation::ZEROS
+        };
+        let function = arguments.function(library.functions().standard());
         // SAFETY: all strings are live; callbacks and log live as long as the instance.
-        let (function, handle) = keeping_environment(|| unsafe {
-            match &library.functions {
-                Functions::Fmi2(functions) => {
-                    let kind = interface as fmi2Type;
-                    let instantiate = functions.fmi2Instantiate;
-                    let handle = instantiate(
-                        name,
-                        kind,
-                        token,
-                        resources,
-                        &raw const *callbacks,
-                        fmi2False,
-                        logging_on.into(),
-                    );
-                    ("fmi2Instantiate", handle)
-                }
-                Functions::Fmi3(functions) if interface == Interface::ModelExchange => {
-                    let instantiate = functions.fmi3InstantiateModelExchange;
-                    let log = Some(log_of_fmi3 as fmi3LogMessageCallback);
-                    let handle =
-                        instantiate(name, token, resources, fmi3False, logging_on.into(), environment, log);
-                    ("fmi3InstantiateModelExchange", handle)
-                }
-                Functions::Fmi3(functions) => {
-                    let handle = (functions.fmi3InstantiateCoSimulation)(
-                        name,
-                        token,
-                        resources,
-                        fmi3False,
-                        logging_on.into(),
-                        event_mode.into(),
-                        early_return.into(),
-                        null(),
-                        0,
-                        environment,
-                        Some(log_of_fmi3),
-                        None,
-                    );
-                    ("fmi3InstantiateCoSimulation", handle)
-                }
-            }
-        });
+        let handle = keeping_environment(|| unsafe { library.functions().instantiate(&arguments) });
         if handle.is_null() {
             let messages = log.take();
             log.unregister();
@@ -235,13 +200,13 @@ impl Instance {
             library,
             states: Default::default(),
             label,
-            early_return,
+            early_return: settings.early_return,
         })
     }
 
     /// Returns the FMI version.
     pub fn standard(&self) -> Standard {
-        self.library.standard()
+        self.library.functions().standard()
     }
 
     /// Returns the library of the instance.
@@ -443,7 +408,7 @@ impl Instance {
         let handle = self.handle("fmi2DoStep")?;
         // SAFETY: the instance is alive; the pointers are live references.
         let (function, code) = unsafe {
-            match &self.library.functions {
+            match self.library.functions() {
                 Functions::Fmi2(of) => {
                     let code = (of.fmi2DoStep)(handle, time, size, no_return.into());
                     ("fmi2DoStep", if code == PENDING { wait(of, handle) } else { code })
@@ -478,7 +443,7 @@ impl Instance {
         let (mut wanted, mut reached) = (fmi2False, time);
         let kinds =
             [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
-        let Functions::Fmi2(functions) = &self.library.functions else { return rejection };
+        let Functions::Fmi2(functions) = self.library.functions() else { return rejection };
         if rejection.status() != Status::Discard {
             return rejection;
         }

@@ -1,16 +1,15 @@
-//! Log callbacks for FMUs, and the list of living instances.
+//! The messages of FMUs, and the list of living instances.
 //!
 //! FMUs do not always pass the environment of the instance to the logger: some pass their own pointer, NULL, or the environment of
 //! another instance, and some log from their own threads. So the environment is a number that is looked up, never a pointer that is
 //! dereferenced.
 
+use super::format::Arguments;
 use super::rejection::Message;
-use crate::c_types::{c_char, c_int, c_void};
-use crate::fmi2::types::*;
-use crate::fmi3::types::*;
-use crate::{BaseType, Status};
+use crate::c_types::c_void;
+use crate::calls::{LogMessage, LogReceiver, LogValues, string};
+use crate::{BaseType, Standard, Status};
 use std::collections::{BTreeMap, VecDeque};
-use std::ffi::CStr;
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
@@ -175,105 +174,16 @@ fn store(environment: usize, mut message: Message, has_references: bool) {
     push_limited(&mut lock(&STRAY), (std::thread::current().id(), message));
 }
 
-/// Copies a C string; returns an empty string for a null pointer.
-///
-/// # Safety
-/// `pointer` is null or points to a NUL-terminated string.
-unsafe fn string(pointer: *const c_char) -> String {
-    if pointer.is_null() {
-        return String::new();
+impl LogReceiver for Log {
+    unsafe fn receive(message: LogMessage) {
+        // SAFETY: the caller guarantees NULL or NUL-terminated strings.
+        let owned = |pointer| unsafe { string(pointer) }.unwrap_or_default().to_string_lossy().into_owned();
+        let (status, category) = (Status::from_c(message.status), owned(message.category));
+        let mut text = owned(message.text);
+        if let Some(LogValues { words, numbers }) = message.values {
+            text = Arguments::new(words, numbers).expand(&text);
+        }
+        let has_references = message.standard == Standard::Fmi2;
+        store(message.environment.addr(), Message { status, category, text }, has_references);
     }
-    // SAFETY: the caller guarantees NULL or a NUL-terminated string.
-    unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
-}
-
-/// Returns the callbacks of FMI 2.0 (section 2.1.5 of FMI 2.0.5). The returned value must live as long as the
-/// instance. The memory functions call `calloc` and `free` of C. They must be present, because only an FMU with
-/// `canNotUseMemoryManagementFunctions` ignores them.
-pub fn callbacks(environment: *mut c_void) -> fmi2CallbackFunctions {
-    let logger = log_of_fmi2 as *const ();
-    fmi2CallbackFunctions {
-        // SAFETY: the documentation of `log_of_fmi2` explains why both types have compatible calls.
-        logger: Some(unsafe { std::mem::transmute::<*const (), fmi2CallbackLogger>(logger) }),
-        allocate_memory: Some(allocate),
-        free_memory: Some(free),
-        step_finished: None,
-        component_environment: environment,
-    }
-}
-
-unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {
-    // SAFETY: any arguments are allowed; the FMU frees the memory with `free`.
-    unsafe { libc::calloc(count, size) }
-}
-
-unsafe extern "C" fn free(memory: *mut c_void) {
-    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL, or memory of `allocate` that is freed once.
-    unsafe { libc::free(memory) }
-}
-
-/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has a fixed number of arguments: integers and
-/// pointers, then floating-point numbers, which are passed in separate registers. On Linux, and on macOS with Intel processors,
-/// variadic functions receive their arguments in these registers and then on the stack. If the caller passes fewer arguments, the
-/// others have arbitrary values; reading them is harmless there, and a correct format does not use them.
-#[cfg(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64")))]
-#[allow(clippy::too_many_arguments, reason = "the arguments of the format")]
-unsafe extern "C" fn log_of_fmi2(
-    environment: fmi2ComponentEnvironment,
-    _instance_name: fmi2String,
-    status: fmi2Status,
-    category: fmi2String,
-    message: fmi2String,
-    a: usize,
-    b: usize,
-    c: usize,
-    d: usize,
-    e: usize,
-    f: usize,
-    g: usize,
-    h: usize,
-    r: f64,
-    s: f64,
-    t: f64,
-    u: f64,
-    v: f64,
-    w: f64,
-    x: f64,
-    y: f64,
-) {
-    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
-    let [category, format] = [category, message].map(|text| unsafe { string(text) });
-    let arguments = super::format::Arguments::new([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]);
-    let message = Message { status: Status::from_c(status), category, text: arguments.expand(&format) };
-    store(environment.addr(), message, true);
-}
-
-/// Logger of FMI 2.0 for all other platforms. It does not expand formats, because it cannot read variadic arguments there. The
-/// arguments before the `...` are passed in the same way as to a function without `...`.
-#[cfg(not(any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
-unsafe extern "C" fn log_of_fmi2(
-    environment: fmi2ComponentEnvironment,
-    _instance_name: fmi2String,
-    status: fmi2Status,
-    category: fmi2String,
-    message: fmi2String,
-) {
-    // SAFETY: section 2.1.5 of FMI 2.0 requires NULL or NUL-terminated strings.
-    let [category, text] = [category, message].map(|text| unsafe { string(text) });
-    store(environment.addr(), Message { status: Status::from_c(status), category, text }, true);
-}
-
-/// Logger of FMI 3.0 for instances of this crate.
-///
-/// # Safety
-/// Category and message are NULL or NUL-terminated strings (section 2.3.1 of FMI 3.0).
-pub unsafe extern "C" fn log_of_fmi3(
-    environment: fmi3InstanceEnvironment,
-    status: c_int,
-    category: fmi3String,
-    message: fmi3String,
-) {
-    // SAFETY: the caller guarantees NULL or NUL-terminated strings.
-    let [category, text] = [category, message].map(|text| unsafe { string(text) });
-    store(environment.addr(), Message { status: Status::from_c(status), category, text }, false);
 }

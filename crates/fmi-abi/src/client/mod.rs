@@ -6,13 +6,13 @@
 //! anything. The methods of an instance are safe, because they check lengths and keep the library loaded while it is used.
 //!
 //! ```rust,no_run
-//! use fmi_abi::client::{Instance, Library, Settings};
+//! use fmi_abi::client::{Instance, Settings, load};
 //! use fmi_abi::{BaseType, Interface, Standard};
 //! use std::sync::Arc;
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     // SAFETY: the library of a trusted FMU for FMI 2.0.
-//!     let library = unsafe { Library::load("binaries/linux64/model.so".as_ref(), Standard::Fmi2) }?;
+//!     let library = unsafe { load("binaries/linux64/model.so".as_ref(), Standard::Fmi2) }?;
 //!     let settings = Settings { token: "{guid}", ..Settings::new(Interface::CoSimulation) };
 //!     let mut instance = Instance::new(&Arc::new(library), &settings)?;
 //!     instance.initialize(0.0, Some(1.0), None)?;
@@ -25,7 +25,7 @@
 //! }
 //! ```
 //!
-//! [`Library`] holds the functions of an FMU, and [`Instance`] calls them. Module `instance` contains the life cycle, steps, events
+//! [`load`] loads the functions of an FMU, and [`Instance`] calls them. Module `instance` contains the life cycle, steps, events
 //! and derivatives, `values` gets and sets variables, and `states` saves and restores states, whose handles are stored in `saved`.
 //! `log` receives messages and keeps a list of the living instances, because the pointer that an FMU passes to the logger cannot be
 //! trusted. `format` expands `printf` formats, whose arguments cannot be trusted either. `rejection` contains the errors, and
@@ -41,8 +41,9 @@ mod saved;
 mod states;
 mod values;
 
+pub use crate::calls::{Library, LoadError};
 pub use instance::{Continuous, Event, Instance, Settings};
-pub use library::{Functions, Library};
-pub use log::{LogListener, VariableNames, callbacks, log_of_fmi3};
+pub use library::load;
+pub use log::{LogListener, VariableNames};
 pub use rejection::{Message, Rejection, reason};
 pub use saved::Saved;

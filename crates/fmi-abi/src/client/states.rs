@@ -1,10 +1,10 @@
 //! Saves, restores and serializes the state of an instance.
 
 use super::instance::{Instance, call};
-use super::library::Functions;
 use super::rejection::Rejection;
 use super::saved::Saved;
 use crate::c_types::{c_int, c_void};
+use crate::calls::Functions;
 use std::alloc::{Layout, alloc_zeroed};
 use std::ptr::null_mut;
 

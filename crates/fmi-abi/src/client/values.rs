@@ -4,11 +4,11 @@
 //! [`Value`]s, which hold every type exactly. An array variable of FMI 3.0 has several values.
 
 use super::instance::{Instance, call};
-use super::library::Functions;
 use super::rejection::Rejection;
 use crate::c_types::{c_char, c_int};
+use crate::calls::{Functions, string};
 use crate::{BaseType, Standard, Value};
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 use std::ptr::null;
 
 /// A number type of the FMI functions, with conversions from and to `f64` and [`Value`].
@@ -127,7 +127,7 @@ impl Number for f64 {
 /// also passes `$n`, the number of values, which is the last argument of these functions.
 macro_rules! functions {
     ($with:ident, $library:expr, $base:expr, $n:ident) => {
-        match (&$library.functions, $base) {
+        match ($library.functions(), $base) {
             (Functions::Fmi2(f), BaseType::Real | BaseType::Float32) => $with!(f fmi2SetReal fmi2GetReal),
             (Functions::Fmi2(f), BaseType::Boolean) => $with!(f fmi2SetBoolean fmi2GetBoolean),
             (Functions::Fmi2(f), _) => $with!(f fmi2SetInteger fmi2GetInteger),
@@ -280,12 +280,9 @@ impl Instance {
         let mut strings = vec![null::<c_char>(); n];
         let (vr, count, values) = (vr.as_ptr(), vr.len(), strings.as_mut_ptr());
         call!(self, fmi2GetString(vr, count, values), fmi3GetString(vr, count, values, n))?;
-        let owned = |string: *const c_char| match string.is_null() {
-            true => String::new(),
-            // SAFETY: the strings belong to the FMU and are valid until the next call.
-            false => unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned(),
-        };
-        Ok(strings.into_iter().map(|string| Value::String(owned(string))).collect())
+        // SAFETY: the strings belong to the FMU and are valid until the next call.
+        let owned = |text| unsafe { string(text) }.unwrap_or_default().to_string_lossy().into_owned();
+        Ok(strings.into_iter().map(|text| Value::String(owned(text))).collect())
     }
 
     fn set_binaries(&mut self, vr: &[u32], values: &[Value]) -> Result<(), Rejection> {

@@ -5,8 +5,8 @@ use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
 use crate::finding::fails;
 use crate::writer::{Part, Trajectory};
-use fmi_abi::calls::{fmi2, fmi3, signatures};
-use fmi_abi::{Interface, Mode, Standard};
+use fmi_abi::calls::{signatures, without_instance};
+use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
 
 /// Checks that the loader can resolve all symbols when it loads the library. By default, it resolves a function when the
@@ -37,8 +37,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
-        let without_instance = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
-        let wanted = without_instance.iter().copied().filter(|name| match *name {
+        let wanted = without_instance(standard).iter().copied().filter(|name| match *name {
             "fmi3InstantiateModelExchange" => interface == Interface::ModelExchange,
             "fmi3InstantiateCoSimulation" => interface == Interface::CoSimulation,
             name => name != "fmi3InstantiateScheduledExecution",

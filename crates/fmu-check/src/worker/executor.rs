@@ -2,14 +2,14 @@
 
 use super::arrays::{Content, PassedArray, blobs, read, word_of};
 use super::job::{EXECUTED, Unloadable};
-use super::logger::{ENVIRONMENT_STEP, ENVIRONMENTS, log_of_fmi2, log_of_fmi3, messages};
+use super::logger::{ENVIRONMENT_STEP, ENVIRONMENTS, Recorder, messages};
 use super::memory::{Guarded, in_fmu};
 use super::{locked, updates};
 use crate::call_sequence::{Arg, Kind, Make, Outcome, Setting, Values};
 use fmi_abi::c_types::{c_char, c_void};
-use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
-use fmi_abi::fmi3::types::fmi3LogMessageCallback;
-use fmi_abi::{Standard, calls, fmi2, fmi3};
+use fmi_abi::calls::{Functions, Instantiation, Library, callbacks, log_callback};
+use fmi_abi::fmi2::types::fmi2CallbackFunctions;
+use fmi_abi::{Interface, Standard};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::ffi::CString;
@@ -42,7 +42,7 @@ unsafe impl Send for Instance {}
 pub struct Executor {
     pub setting: Setting,
     /// Loaded libraries of Co-Simulation and Model Exchange.
-    pub libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
+    pub libraries: Mutex<[Option<&'static Library>; 2]>,
     pub instances: Mutex<HashMap<usize, Instance>>,
     /// Handles of the saved states, by index.
     pub states: Mutex<HashMap<usize, usize>>,
@@ -54,11 +54,6 @@ pub struct Executor {
     pub file: Mutex<File>,
     /// Number of the step before which this process waits for a debugger.
     pub stop_before: Option<u32>,
-}
-
-unsafe extern "C" {
-    fn calloc(count: usize, size: usize) -> *mut c_void;
-    fn free(memory: *mut c_void);
 }
 
 impl Executor {
@@ -78,14 +73,19 @@ impl Executor {
         let _ = locked(&self.file).write_all(&line);
     }
 
+    /// Returns the FMI version of the FMU.
+    fn standard(&self) -> Standard {
+        if self.setting.fmi3 { Standard::Fmi3 } else { Standard::Fmi2 }
+    }
+
     /// Returns the name of a function with its prefix.
     pub fn named(&self, end: &str) -> String {
         format!("{}{end}", if self.setting.fmi3 { "fmi3" } else { "fmi2" })
     }
 
-    /// Returns the address of a function, and loads the library first if necessary; `None` if the library lacks the function.
-    /// Ends the process if the library cannot be loaded.
-    pub fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
+    /// Returns the functions of the FMU if they include the one of this name, and loads the library first if necessary; `None` if the
+    /// library lacks the function. Ends the process if the library cannot be loaded.
+    pub fn find(&self, co_simulation: bool, name: &str) -> Option<&'static Functions> {
         let index = usize::from(!co_simulation);
         let mut libraries = locked(&self.libraries);
         if libraries[index].is_none() {
@@ -94,8 +94,7 @@ impl Executor {
                 libraries[1] = libraries[0];
             } else {
                 // SAFETY: loading the library may run any code of the FMU, in a process that may crash.
-                let loaded = in_fmu(|| unsafe { libloading::Library::new(path) });
-                match loaded {
+                match in_fmu(|| unsafe { Library::load(path, self.standard()) }) {
                     Ok(library) => libraries[index] = Some(Box::leak(Box::new(library))),
                     Err(error) => {
                         let why = std::error::Error::source(&error)
@@ -106,9 +105,7 @@ impl Executor {
                 }
             }
         }
-        // SAFETY: the symbol is only used as an address.
-        let found = unsafe { libraries[index]?.get::<*const c_void>(name.as_bytes()) };
-        found.ok().map(|symbol| *symbol).filter(|address| !address.is_null())
+        libraries[index].filter(|library| library.find(name).is_ok()).map(Library::functions)
     }
 
     /// Instantiates the FMU, and stores the instance at an index.
@@ -116,68 +113,35 @@ impl Executor {
         // Strings are unmapped after the call: an FMU must copy the strings that it uses later.
         let text = |text: &str| Guarded::new(&CString::new(text).unwrap_or_default().into_bytes_with_nul());
         let (name, token) = (text(&make.name), text(&make.token));
-        let standard = if self.setting.fmi3 { Standard::Fmi3 } else { Standard::Fmi2 };
+        let standard = self.standard();
         let location = standard.resources(&self.setting.resources);
         let resources = Guarded::new(location.as_bytes_with_nul());
         let word = |text: &Guarded| text.address() as usize as *const c_char;
         // Section 2.3.1 of FMI 3.0.2: NULL if the FMU has no resources.
-        let has_resources = !self.setting.fmi3 || self.setting.resources.is_dir();
+        let has_resources = standard == Standard::Fmi2 || self.setting.resources.is_dir();
         // Each instance gets a different environment pointer. It is not a valid address, because the FMU must not dereference it.
         let environment = ENVIRONMENTS.fetch_add(ENVIRONMENT_STEP, Ordering::Relaxed) as *mut c_void;
-        let mut callbacks = None;
-        let logger = log_of_fmi2 as *const ();
-        let log: fmi3LogMessageCallback = log_of_fmi3;
-        let function = match (self.setting.fmi3, make.co_simulation) {
-            (false, _) => "fmi2Instantiate",
-            (true, true) => "fmi3InstantiateCoSimulation",
-            (true, false) => "fmi3InstantiateModelExchange",
+        let callbacks = Box::new(callbacks::<Recorder>(environment));
+        let interface = if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
+        let arguments = Instantiation {
+            interface: interface as _,
+            name: word(&name),
+            token: word(&token),
+            resources: if has_resources { word(&resources) } else { std::ptr::null() },
+            logging_on: make.logging.into(),
+            callbacks: &raw const *callbacks,
+            environment,
+            log: Some(log_callback::<Recorder>()),
+            event_mode_used: make.event_mode.into(),
+            early_return_allowed: make.early_return.into(),
+            ..Instantiation::ZEROS
         };
-        let Some(address) = self.find(make.co_simulation, function) else {
+        let Some(functions) = self.find(make.co_simulation, arguments.function(standard)) else {
             outcome.missing = true;
             return;
         };
-        let find = |name: &str| (name == function).then_some(address);
-        let (instance_name, guid) = (word(&name), word(&token));
-        let location = if has_resources { word(&resources) } else { std::ptr::null() };
-        let logging = u8::from(make.logging);
         // SAFETY: the function has the type of the standard, and the arguments are as the standard requires.
-        let handle = in_fmu(|| unsafe {
-            match (self.setting.fmi3, make.co_simulation) {
-                (false, co_simulation) => {
-                    let given = &**callbacks.insert(Box::new(fmi2CallbackFunctions {
-                        logger: Some(std::mem::transmute::<*const (), fmi2CallbackLogger>(logger)),
-                        allocate_memory: Some(calloc),
-                        free_memory: Some(free),
-                        step_finished: None,
-                        component_environment: environment,
-                    }));
-                    let instantiate = fmi2::Functions::find(find).fmi2Instantiate;
-                    let kind = co_simulation.into();
-                    instantiate(instance_name, kind, guid, location, given, 0, logging.into())
-                }
-                (true, false) => {
-                    let instantiate = fmi3::Functions::find(find).fmi3InstantiateModelExchange;
-                    instantiate(instance_name, guid, location, 0, logging, environment, Some(log))
-                }
-                (true, true) => {
-                    let instantiate = fmi3::Functions::find(find).fmi3InstantiateCoSimulation;
-                    instantiate(
-                        instance_name,
-                        guid,
-                        location,
-                        0,
-                        logging,
-                        make.event_mode.into(),
-                        make.early_return.into(),
-                        std::ptr::null(),
-                        0,
-                        environment,
-                        Some(log),
-                        None,
-                    )
-                }
-            }
-        });
+        let handle = in_fmu(|| unsafe { functions.instantiate(&arguments) });
         for text in [name, token, resources] {
             outcome.damage.extend(text.damage(true));
         }
@@ -192,7 +156,7 @@ impl Executor {
                 environment,
                 co_simulation,
                 next_event,
-                _callbacks: callbacks,
+                _callbacks: Some(callbacks),
             },
         );
     }
@@ -217,14 +181,15 @@ impl Executor {
             },
             None => (0, 0, self.setting.libraries[0].is_some()),
         };
-        let Some(address) = self.find(co_simulation, function) else {
+        let Some(functions) = self.find(co_simulation, function) else {
             outcome.missing = true;
             return;
         };
         let mut arrays = Vec::new();
         let words: Vec<u64> = args.iter().map(|arg| self.argument(arg, &mut arrays)).collect();
         // SAFETY: the words are the arguments of the function; the FMU may still crash this process.
-        let call = || in_fmu(|| unsafe { calls::call(address, function, handle as *mut c_void, &words) });
+        let call =
+            || in_fmu(|| unsafe { functions.call(function, handle as *mut c_void, &words) }).unwrap_or(-1);
         let status = updates::iterate(function, call(), &arrays, call);
         outcome.status = Some(status);
         let is_string = |array: &PassedArray| matches!(array.content, Content::Output(Kind::Pointer, _));

@@ -1,9 +1,9 @@
-//! Loggers that are passed to the FMU, and the messages that it has logged.
+//! The messages that the FMU has logged.
 
 use super::locked;
 use crate::call_sequence::Message;
-use fmi_abi::c_types::{c_char, c_int, c_void};
-use std::ffi::CStr;
+use fmi_abi::c_types::c_char;
+use fmi_abi::calls::{LogMessage, LogReceiver, LogValues, string};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -17,66 +17,40 @@ pub const ENVIRONMENT_STEP: usize = 16;
 /// Environment pointer of the next instance.
 pub static ENVIRONMENTS: AtomicUsize = AtomicUsize::new(FIRST_ENVIRONMENT);
 
-/// Records a message, unless there are 1000 already.
+/// Records the messages of all instances, at most 1000.
+pub struct Recorder;
+
+impl LogReceiver for Recorder {
+    unsafe fn receive(message: LogMessage) {
+        let LogMessage { environment, instance_name, status, category, text, values, .. } = message;
+        // SAFETY: the caller guarantees strings that end with NUL. The name is read because importers print it, and the values
+        // because the text is a format of printf for them (section 2.1.5 of FMI 2.0).
+        let (category, text) = unsafe {
+            std::hint::black_box(text_at(instance_name));
+            let expanded = values.filter(|_| !text.is_null()).map(|values| print(text, &values));
+            (text_at(category), expanded.or_else(|| text_at(text)))
+        };
+        let mut messages = locked(&MESSAGES);
+        if messages.len() < 1000 {
+            messages.push((environment as usize, Message { status, category, text }));
+        }
+    }
+}
+
+/// Formats a message with `snprintf`, as importers do. A format that does not fit the values may crash this process.
 ///
 /// # Safety
-/// Each pointer is NULL or points to a string that ends with NUL.
-unsafe fn record(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
-    // SAFETY: the caller's requirement.
-    let [category, text] = [category, text].map(|pointer| unsafe { text_at(pointer) });
-    let mut messages = locked(&MESSAGES);
-    if messages.len() < 1000 {
-        messages.push((environment as usize, Message { status, category, text }));
-    }
-}
-
-/// Logger of FMI 2.0. Stable Rust cannot define variadic functions, so this one has fixed arguments: six integers or pointers,
-/// then four floating-point numbers, which have separate registers. On Linux, and on macOS with Intel processors, variadic
-/// arguments are passed in the same way. On other systems, the format is recorded without the values.
-#[allow(clippy::too_many_arguments, reason = "the values of the message")]
-pub unsafe extern "C" fn log_of_fmi2(
-    environment: *mut c_void,
-    instance_name: *const c_char,
-    status: c_int,
-    category: *const c_char,
-    text: *const c_char,
-    a: usize,
-    b: usize,
-    c: usize,
-    d: usize,
-    e: usize,
-    f: usize,
-    x: f64,
-    y: f64,
-    z: f64,
-    w: f64,
-) {
-    // SAFETY: section 2.1.5 of FMI 2.0: the strings end with NUL, and `text` is a format of printf for the values. The name is
-    // read because importers print it.
-    unsafe {
-        std::hint::black_box(text_at(instance_name));
-        #[cfg(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64"))))]
-        if !text.is_null() {
-            let print = |to: *mut c_char, size| libc::snprintf(to, size, text, a, b, c, d, e, f, x, y, z, w);
-            let mut message = vec![0; usize::try_from(print(std::ptr::null_mut(), 0)).unwrap_or(0) + 1];
-            print(message.as_mut_ptr(), message.len());
-            return record(environment, status, category, message.as_ptr());
-        }
-        #[cfg(not(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64")))))]
-        std::hint::black_box((a, b, c, d, e, f, x, y, z, w));
-        record(environment, status, category, text);
-    }
-}
-
-/// Logger of FMI 3.0.
-pub unsafe extern "C" fn log_of_fmi3(
-    environment: *mut c_void,
-    status: c_int,
-    category: *const c_char,
-    text: *const c_char,
-) {
-    // SAFETY: section 2.3.1 of FMI 3.0: the strings end with NUL.
-    unsafe { record(environment, status, category, text) }
+/// The format ends with NUL, and the values have the types of its conversions.
+unsafe fn print(format: *const c_char, values: &LogValues) -> Vec<u8> {
+    let ([a, b, c, d, e, f, g, h], [r, s, t, u, v, w, x, y]) = (values.words, values.numbers);
+    // SAFETY: the caller guarantees that the values fit the format; more values than conversions are allowed.
+    let print = |to, size| unsafe {
+        libc::snprintf(to, size, format, a, b, c, d, e, f, g, h, r, s, t, u, v, w, x, y)
+    };
+    let mut message = vec![0_u8; usize::try_from(print(std::ptr::null_mut(), 0)).unwrap_or(0) + 1];
+    print(message.as_mut_ptr().cast(), message.len());
+    message.truncate(message.iter().position(|byte| *byte == 0).unwrap_or_default());
+    message
 }
 
 /// Removes and returns the messages with this environment pointer, and separately the messages with a pointer that no instance
@@ -104,23 +78,23 @@ pub fn messages(environment: usize) -> (Vec<Message>, Vec<Message>) {
 /// The pointer is NULL or points to a string that ends with NUL.
 pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
     // SAFETY: the caller's requirement.
-    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())
+    unsafe { string(pointer) }.map(|text| text.to_bytes().to_vec())
 }
 
-#[cfg(all(test, unix, not(all(target_vendor = "apple", target_arch = "aarch64"))))]
+#[cfg(all(test, any(all(unix, target_arch = "x86_64"), all(target_os = "linux", target_arch = "aarch64"))))]
 mod tests {
-    use super::{FIRST_ENVIRONMENT, log_of_fmi2, messages};
-    use fmi_abi::fmi2::types::fmi2CallbackLogger;
+    use super::{FIRST_ENVIRONMENT, Recorder, messages};
+    use fmi_abi::calls::callbacks;
 
     #[test]
     fn messages_of_fmi2_have_their_values() {
         let format = c"Wrong GUID %s, line %d of %s: t = %g, %5.1e, 100 %%";
         // SAFETY: the values have the types of the format.
         unsafe {
-            let log = std::mem::transmute::<*const (), fmi2CallbackLogger>(log_of_fmi2 as *const ());
+            let callbacks = callbacks::<Recorder>(FIRST_ENVIRONMENT as _);
             let (token, path) = (c"{8c4e}".as_ptr(), c"model.fmu".as_ptr());
-            log(
-                FIRST_ENVIRONMENT as _,
+            callbacks.logger.unwrap()(
+                callbacks.component_environment,
                 c"name".as_ptr(),
                 0,
                 c"".as_ptr(),

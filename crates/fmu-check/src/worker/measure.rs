@@ -22,9 +22,12 @@ fn memory() -> (u64, bool) {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
         type Info = unsafe extern "C" fn() -> libc::mallinfo2;
-        let this = libloading::os::unix::Library::this();
-        // SAFETY: the function of this name has this type.
-        if let Ok(info) = unsafe { this.get::<Info>(b"mallinfo2") }.map(|info| unsafe { info() }) {
+        // SAFETY: the function of this name has this type, and `None` is a null pointer.
+        let info = unsafe {
+            let found = libc::dlsym(libc::RTLD_DEFAULT, c"mallinfo2".as_ptr());
+            std::mem::transmute::<*mut libc::c_void, Option<Info>>(found).map(|info| info())
+        };
+        if let Some(info) = info {
             return ((info.uordblks + info.hblkhd) as u64, true);
         }
     }

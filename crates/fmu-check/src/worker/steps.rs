@@ -7,7 +7,7 @@ use super::memory::{self, in_fmu};
 use super::work::wait_for_debugger;
 use super::{integrate, locked, measure};
 use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step, step_name};
-use fmi_abi::c_types::{c_char, c_void};
+use fmi_abi::c_types::c_void;
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -81,26 +81,21 @@ impl Executor {
                 });
                 let Some(instance) = null.or_else(|| locked(&self.instances).remove(index)) else { return };
                 let name = self.named("FreeInstance");
-                let address = self.find(instance.co_simulation, &name);
-                outcome.missing = address.is_none();
-                outcome.status = address.map(|address| {
-                    // SAFETY: the functions of both FMI versions have this type.
-                    in_fmu(|| unsafe {
-                        let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
-                        function(instance.handle as *mut c_void);
-                    });
+                let functions = self.find(instance.co_simulation, &name);
+                outcome.missing = functions.is_none();
+                outcome.status = functions.map(|functions| {
+                    // SAFETY: the handle is NULL, or an instance that has not been freed.
+                    in_fmu(|| unsafe { functions.free(instance.handle as *mut c_void) });
                     0
                 });
                 (outcome.log, outcome.strays) = messages(instance.environment);
             }
             Step::Version(name) => {
-                let address = self.find(self.setting.libraries[0].is_some(), name);
-                outcome.missing = address.is_none();
+                let functions = self.find(self.setting.libraries[0].is_some(), name);
+                outcome.missing = functions.is_none();
                 // SAFETY: these functions have no arguments and return a string.
-                outcome.text = address.and_then(|address| unsafe {
-                    let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
-                    text_at(in_fmu(|| function()))
-                });
+                outcome.text =
+                    functions.and_then(|functions| unsafe { text_at(in_fmu(|| functions.version(name))) });
             }
             Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
             Step::Integrate(instance, how) => {

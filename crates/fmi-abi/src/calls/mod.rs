@@ -1,0 +1,19 @@
+//! Calls any FMU (FMI 2.0 and 3.0) with any arguments, also with wrong ones. [`client`](crate::client) is the safe way to call an FMU.
+//!
+//! A program that tests an FMU must also make the calls that a safe client prevents, so nothing here is checked: pointers may be NULL or
+//! wrong, and the order of the calls is arbitrary. [`Library`] loads an FMU, and [`Functions`] contains its functions.
+//! [`Functions::instantiate`] takes the arguments of all instantiation functions as one [`Instantiation`]. The other functions are called
+//! as fields of the structures in [`Functions`], or by name with [`Functions::call`], for which [`signatures`] lists the types of the
+//! arguments. Log messages go to a [`LogReceiver`].
+
+mod functions;
+mod instantiation;
+mod library;
+mod log;
+mod signatures;
+
+pub use functions::Functions;
+pub use instantiation::Instantiation;
+pub use library::{Library, LoadError, provide_symbols};
+pub use log::{LogMessage, LogReceiver, LogValues, callbacks, log_callback, string};
+pub use signatures::{Argument, Signature, signature, signatures, without_instance};
