@@ -4,7 +4,7 @@ use crate::call_sequence::Kind;
 use crate::rules::Observation;
 pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
-use fmi_abi::{BaseType, Causality, Initial, Standard, Variability, is_c_identifier, shown};
+use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability, is_c_identifier, shown};
 use std::collections::{HashMap, HashSet};
 use std::ops::Deref;
 
@@ -288,14 +288,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
         let why = format!("the start value of {name}, {number}, is outside its min and max");
         add("description.range", why);
     }
-    let is_value: fn(&String) -> bool = match variable.base {
-        Some(BaseType::String | BaseType::Binary) | None => |_| true,
-        Some(BaseType::Boolean) => |text| ["true", "false", "1", "0"].contains(&text.as_str()),
-        Some(base) if base.is_float() => {
-            |text| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str())
-        }
-        Some(_) => |text| text.parse::<i128>().is_ok(),
-    };
+    let is_value = |text: &String| variable.base.is_none_or(|base| Value::read(base, text).is_some());
     if !variable.start.iter().all(is_value) {
         let what = variable.base.map_or("value".to_owned(), |base| base.to_string());
         let why = format!("the start value of {name}, {:?}, is not a {what}", variable.start.join(" "));
@@ -335,8 +328,8 @@ pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
 mod tests {
     use super::Description;
 
-    /// Variables of different types may have the same value reference in FMI 2.0 (section 2.2.7), so they are variables of their own, which may be
-    /// read in other modes.
+    /// In FMI 2.0, variables of different types may have the same value reference (section 2.2.7), but they are not aliases, so another
+    /// one may be readable in other modes.
     #[test]
     fn references_belong_to_a_type() {
         let variables: String = [("a", "output", "Real"), ("b", "local", "Integer"), ("c", "local", "Boolean")]
@@ -357,5 +350,19 @@ mod tests {
             assert_eq!(description.aliases(index).collect::<Vec<_>>(), [index]);
             assert_eq!(description.is_readable_while_initializing(index), index == 0);
         }
+    }
+
+    #[test]
+    fn start_values_fit_their_type() {
+        let is_wrong = |start: &str| {
+            let text = format!(
+                "<fmiModelDescription fmiVersion='3.0' instantiationToken='t' modelName='m'><CoSimulation modelIdentifier='m'/>\
+                 <ModelVariables><Int8 name='a' valueReference='1' causality='parameter' variability='fixed' start='{start}'/>\
+                 </ModelVariables></fmiModelDescription>"
+            );
+            let description = Description::parse(&text).expect("a model description");
+            description.wrong.iter().any(|(rule, _)| *rule == "description.start")
+        };
+        assert_eq!(["-128", "127", "128", "1.5"].map(is_wrong), [false, false, true, true]);
     }
 }

@@ -9,9 +9,10 @@ use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Proof, Severity};
 use crate::options::{FailOn, Options};
 use crate::rules::TOPICS;
-use anyhow::Context as _;
+use fmi_abi::write::write_atomically;
 use fmi_abi::{one_line, shown, shown_to};
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 
 /// Version of the format of the report.
@@ -247,16 +248,10 @@ impl Report {
     /// # Errors
     /// Fails if a file cannot be written.
     pub fn write(&self, directory: &Path) -> anyhow::Result<()> {
-        std::fs::create_dir_all(directory)
-            .with_context(|| format!("{}: cannot be created", shown(&directory.to_string_lossy())))?;
         // Atomically, so that a full disk does not leave a part of a report.
         let write = |name: &str, content: Vec<u8>| {
-            let (path, new) = (directory.join(name), directory.join(format!(".{name}.new")));
-            let written = std::fs::write(&new, content).and_then(|()| std::fs::rename(&new, &path));
-            if written.is_err() {
-                let _ = std::fs::remove_file(&new);
-            }
-            written.with_context(|| format!("{}: cannot be written", shown(&path.to_string_lossy())))
+            let written = write_atomically(&directory.join(name), |file| file.write_all(&content));
+            written.map_err(anyhow::Error::msg)
         };
         write("report.json", self.json()?.into())?;
         write("junit.xml", self.junit().into())?;
