@@ -169,6 +169,16 @@ impl FmiState {
         Self(bit(standard, interface, mode))
     }
 
+    /// Returns the state as a number, which [`from_bits`](Self::from_bits) turns back, so that it can be stored atomically.
+    pub const fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// Returns the state with these [`bits`](Self::bits).
+    pub const fn from_bits(bits: u64) -> Self {
+        Self(bits)
+    }
+
     /// Returns whether the set contains this state.
     #[inline]
     pub const fn is_in(self, set: AllowedStates) -> bool {

@@ -190,7 +190,8 @@ pub fn assert_no_system_call<M: Exported>() {
     assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }
 
-/// Searches all files below a directory for locks and other shared data; returns the number of files.
+/// Searches all files below a directory for locks and other shared data; returns the number of files. Only the gate of an
+/// instance may be atomic, because no call waits for it: an overlapping call is an error.
 ///
 /// # Panics
 /// Panics if it finds any.
@@ -212,7 +213,8 @@ pub fn assert_nothing_to_lock(directory: &Path) -> usize {
                 continue;
             }
             for word in source.split(|c: char| !c.is_alphanumeric() && c != '_') {
-                let found = shared.contains(&word) || word.starts_with("Atomic");
+                let found = shared.contains(&word)
+                    || word.starts_with("Atomic") && !path.ends_with("boundary/gate.rs");
                 assert!(!found, "{} has {word}", path.display());
             }
             assert!(!source.contains("static mut"), "{} has static mut", path.display());

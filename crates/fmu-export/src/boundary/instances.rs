@@ -1,5 +1,6 @@
 //! Creation and release of instances.
 
+use super::call::reject_overlap;
 use super::{Component, ImporterLog, forget_panic, panic_message};
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, reject};
@@ -8,8 +9,7 @@ use crate::model::Setup;
 use crate::stamp::stamp;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
-use fmi_abi::{Interface, Standard};
-use std::cell::{Cell, UnsafeCell};
+use fmi_abi::{FmiState, Interface, Standard};
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -39,8 +39,7 @@ pub(crate) fn instantiate<M: Exported>(
         let rejection = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {
             Ok(Ok(mut instance)) => {
                 instance.logger.take().iter().for_each(|message| importer.deliver(message));
-                let instance = UnsafeCell::new(instance);
-                return Some(Box::new(Component { delivering: Cell::new(false), instance, importer }));
+                return Some(Box::new(Component::new(instance, importer)));
             }
             Ok(Err(rejection)) => rejection.message,
             Err(panic) => {
@@ -90,14 +89,17 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
     Instance::new(setup, importer, logging_on)
 }
 
-/// Frees an instance; ignores NULL and calls from the log callback.
+/// Frees an instance. Ignores NULL, and an instance that another call uses: the caller may be the log callback or another
+/// thread.
 ///
 /// # Safety
 /// `c` is NULL or an instance of this model that has not been freed.
-pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
+pub(crate) unsafe fn free<M: Exported>(function: &str, c: *mut c_void) {
     let component = c.cast::<Component<M>>();
     // SAFETY: by contract, `c` is NULL or a live component of this model.
-    if unsafe { component.as_ref() }.is_none_or(|component| component.delivering.get()) {
+    let Some(shared) = (unsafe { component.as_ref() }) else { return };
+    if shared.gate.close() == FmiState::NONE {
+        reject_overlap(shared, function);
         return;
     }
     // SAFETY: by contract, the pointer comes from `instantiate`, which leaked the box, and has not been

@@ -5,6 +5,7 @@
 mod arrays;
 mod call;
 mod derivatives;
+mod gate;
 mod importer_log;
 mod instances;
 pub(crate) mod life_cycle;
@@ -17,6 +18,7 @@ pub(crate) mod webassembly;
 pub(crate) use arrays::{in_slice, of_elements, out_slice, out_value, reserve, same, string};
 pub(crate) use call::{Component, call, call_fast, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
+pub(crate) use gate::Gate;
 pub(crate) use importer_log::{Callback, ImporterLog};
 pub(crate) use instances::{Arguments, free, instantiate};
 

@@ -220,20 +220,20 @@ unsafe fn fmi3_step(
 }
 
 /// Calls the body of a function for model `M`. If the function has fast paths, tries them first: the names in
-/// brackets are their modules, in this order.
+/// brackets are their modules, in this order, after whether they call the model to make a step.
 macro_rules! call {
-    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2GetReal $arguments) };
-    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi2SetReal $arguments) };
-    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast [usual any_size] fmi2DoStep $arguments) };
-    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi3GetFloat64 $arguments) };
-    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast [usual] fmi3SetFloat64 $arguments) };
-    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast [usual any_size] fmi3DoStep $arguments) };
-    (@fast [] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
+    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi2GetReal $arguments) };
+    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi2SetReal $arguments) };
+    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [usual any_size] fmi2DoStep $arguments) };
+    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi3GetFloat64 $arguments) };
+    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi3SetFloat64 $arguments) };
+    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [usual any_size] fmi3DoStep $arguments) };
+    (@fast $steps:literal [] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
         $crate::boundary::call::<M>($c, Function::$function.rule(), |instance| {
             bodies::$function(instance $(, $argument)*)
         })
     };
-    (@fast [$path:ident $($rest:ident)*] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
+    (@fast $steps:literal [$path:ident $($rest:ident)*] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
         // The rest is a separate function, so that the fast path needs no stack space for it.
         #[inline(never)]
         unsafe fn otherwise<M: $crate::Exported>(
@@ -242,18 +242,18 @@ macro_rules! call {
         ) -> fmi_abi::Status {
             // SAFETY: the caller guarantees the contract.
             unsafe {
-                $crate::boundary::short::call!(@fast [$($rest)*] $function($c $(, $argument: $type)*))
+                $crate::boundary::short::call!(@fast $steps [$($rest)*] $function($c $(, $argument: $type)*))
             }
         }
         let fast_path = move |instance: *mut $crate::instance::Instance<M>| {
             $crate::boundary::short::$path::$function(&mut *instance $(, $argument)*)
         };
-        match $crate::boundary::call_fast::<M>($c, Function::$function.rule(), fast_path) {
+        match $crate::boundary::call_fast::<M, $steps>($c, Function::$function.rule(), fast_path) {
             Some(status) => status,
             None => otherwise::<M>($c $(, $argument)*),
         }
     }};
-    ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@fast [] $function $arguments) };
+    ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@fast false [] $function $arguments) };
 }
 pub(crate) use call;
 

@@ -80,7 +80,7 @@ pub unsafe fn broken<M: Exported>(c: *mut c_void, function: *const c_char, reaso
     // SAFETY: the caller guarantees that `c` is NULL or a live component.
     match unsafe { c.cast::<Component<M>>().as_ref() } {
         Some(component) => {
-            component.delivering.set(false);
+            component.gate.set_delivering(false);
             finish(component, &function, Err(Box::new(panic) as Box<dyn Any + Send>))
         }
         None => {

@@ -53,8 +53,8 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     )
 }
 
-/// `fmi2FreeInstance`. Ignores NULL and calls from the log callback.
+/// `fmi2FreeInstance`. Ignores NULL, and an instance that another call uses.
 pub unsafe extern "C" fn fmi2FreeInstance<M: Exported>(c: fmi2Component) {
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { free::<M>(c) }
+    unsafe { free::<M>("fmi2FreeInstance", c) }
 }

@@ -9,8 +9,8 @@
 //!
 //! All functions share one contract with the importer, which is the contract of the FMI standard:
 //! * A component is NULL, or `fmi2Instantiate` of this library has returned it for the same model, and it has not
-//!   been freed. Two threads do not use it at the same time. (A call from within the log callback is safe, and is
-//!   rejected.)
+//!   been freed. Two threads do not use it at the same time, although most of such calls are recognized and rejected.
+//!   (A call from within the log callback is safe, and is rejected.)
 //! * `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` get a pointer to an initialized handle,
 //!   which is NULL before its first use (section 2.1.8 of FMI 2.0). Any value of the handle is safe, because a handle
 //!   is not dereferenced, and is rejected unless it belongs to a state of this instance.

@@ -124,8 +124,8 @@ unsafe fn make<M: Exported>(
     instantiate::<M>(function, log, Arguments { name, guid, resources, logging_on, interface, importer })
 }
 
-/// `fmi3FreeInstance`. Ignores NULL and calls from the log callback.
+/// `fmi3FreeInstance`. Ignores NULL, and an instance that another call uses.
 pub unsafe extern "C" fn fmi3FreeInstance<M: Exported>(c: fmi3Instance) {
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { free::<M>(c) }
+    unsafe { free::<M>("fmi3FreeInstance", c) }
 }

@@ -213,15 +213,6 @@ impl<M: Exported> Instance<M> {
         self.fmi_state = FmiState::new(self.importer.standard, self.setup.interface, mode);
     }
 
-    /// Forbids all calls if messages are being delivered; otherwise allows them as before.
-    #[cold]
-    pub fn while_delivering(&mut self, is_delivering: bool) {
-        self.enter(self.state.mode);
-        if is_delivering {
-            self.fmi_state = FmiState::NONE;
-        }
-    }
-
     /// Replaces the whole state of the instance.
     fn replace(&mut self, state: State<M>) {
         self.state = state;
