@@ -20,8 +20,18 @@ only to paths that they are given, and print only the progress of long work at a
 that the caller can fix is a `prw.UserError`; its message names the cause and, if it is not obvious, the remedy.
 """
 
-import lazy_loader
-
 # __init__.pyi lists the module of each name, which is imported at the first use, so that `import prw` is fast. No module
 # of this package may have the name of a function there, such as `identify`: once imported, it would replace the function.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+# lazy_loader is imported at the first use, too, because an interrupt before the command `prw` can catch it shows a traceback.
+
+
+def __getattr__(name):
+    import lazy_loader
+
+    module = globals()
+    module["__getattr__"], module["__dir__"], module["__all__"] = lazy_loader.attach_stub(__name__, __file__)
+    return module["__all__"] if name == "__all__" else module["__getattr__"](name)
+
+
+def __dir__():
+    return sorted(__getattr__("__all__"))
