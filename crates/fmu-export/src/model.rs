@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// A model that can be exported as an FMU.
 ///
-/// A model consists of a struct with the values of its inputs, parameters and states, a [table](crate::variables)
-/// that maps variables to fields, and equations. This crate provides the C interface, checks the order of calls and
+/// A model consists of a [table](crate::variables) that defines a struct with the values of its inputs, parameters and
+/// states, or maps variables to the fields of another struct, and of equations. This crate provides the C interface, checks the order of calls and
 /// the values, and takes care of the log and of saved states. So a model needs no `unsafe` and no value references.
 ///
 /// A model implements capabilities and names them in [`export_fmu!`](crate::export_fmu):
@@ -39,11 +39,36 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// General data of the model.
     const INFO: Info;
 
-    /// Creates the model with its start values. The start values of the description are read from this model.
+    /// Creates the model with its start values. The start values of the description are read from this model. A model that
+    /// implements [`Default`], as a struct in the table does, needs this function only if values depend on the setup or
+    /// on each other. A model that has neither does not compile:
+    ///
+    /// ```compile_fail,E0080
+    /// use fmu_export::*;
+    ///
+    /// #[derive(Clone)]
+    /// struct Plant {
+    ///     u: f64,
+    /// }
+    ///
+    /// variables! { for Plant;
+    ///     /// Input
+    ///     u = input(&NUMBER) in u;
+    /// }
+    ///
+    /// impl Model for Plant {
+    ///     const INFO: Info = info!("Plant", "plant");
+    /// }
+    ///
+    /// let plant = Plant::new(&Setup::new(Interface::CoSimulation));
+    /// ```
     ///
     /// # Errors
     /// Fails if the model cannot be created. The importer then gets the message instead of an instance.
-    fn new(setup: &Setup) -> Result<Self, Error>;
+    fn new(_setup: &Setup) -> Result<Self, Error> {
+        let start = const { Self::START.expect("a model without Model::new must implement Default") };
+        Ok(start())
+    }
 
     /// Checks conditions between several values and updates fields that depend on parameters. This crate calls it once
     /// after each call of the importer that changes parameters, and after [`restored`](Self::restored). At that time,

@@ -4,7 +4,8 @@
 /// and of FMI 3.0.
 ///
 /// Call it once in `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols belong to the crate
-/// that calls the macro, so several FMU crates can share a workspace.
+/// that calls the macro, so several FMU crates can share a workspace. A crate that contains further models, for example
+/// for tests, calls [`offer!`](crate::offer) for them.
 ///
 /// ```text
 /// export_fmu!(Lag: CoSimulation + ModelExchange);
@@ -28,6 +29,14 @@ macro_rules! symbols {
         #[doc(hidden)]
         #[allow(non_camel_case_types)]
         type __fmu_model = $model;
+
+        // Exported macros are items of the crate. So a second export_fmu!, in whichever module, is an error that states the
+        // reason, instead of an error for each symbol.
+        #[doc(hidden)]
+        #[macro_export]
+        macro_rules! a_crate_can_export_only_one_fmu {
+            () => {};
+        }
 
         /// The C functions of FMI 2.0.
         #[doc(hidden)]

@@ -16,6 +16,11 @@ pub unsafe trait Variables: Sized + 'static {
     /// Names of the lines of the table.
     type Name: Copy + PartialEq + Debug + 'static;
 
+    /// `default` of the model, if it implements [`Default`]; [`Model::new`](crate::Model::new) calls it unless the model
+    /// has another `new`.
+    #[doc(hidden)]
+    const START: Option<fn() -> Self>;
+
     /// The variables, one for each line.
     #[doc(hidden)]
     const LINES: &'static [Variable<Self>];
@@ -430,25 +435,35 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
     index == one.len() && index == other.len()
 }
 
-/// Defines a model's table of variables. Each line contains the kind of a variable, and the field or the calculation
-/// of its value.
+/// Defines a model's struct and its table of variables. Each line contains the name of a variable, its kind, and the field
+/// or the calculation of its value.
 ///
 /// ```text
-/// variables! { for Model, names Name, memory in PLACE, ...;  // `names` and `memory` are optional
+/// variables! {
+///     /// Description in the documentation of the crate
+///     pub struct Model { field: TYPE = VALUE, ... }, names Name, memory in PLACE, ...;  // only the name is required
 ///     /// Description that importers show
-///     name = KIND(&TYPE).refinement() in PLACE;              // the value is a field of the model
-///     name = KIND(&TYPE) in PLACE then PLACE;                // setting it also sets a bool to true
-///     name = KIND(&TYPE) in PLACE then |model| { ... };      // the block runs after the value was set
+///     name: TYPE = KIND(&TYPE).refinement().start(VALUE);    // the value is in a field of this name
+///     name: TYPE = KIND(&TYPE) then PLACE;                   // setting it also sets a bool to true
+///     name: TYPE = KIND(&TYPE) then |model| { ... };         // the block runs after the value was set
+///     name: TYPE = KIND(&TYPE) by |model| ...;               // set in the field, but calculated when it is read
+///     name = KIND(&TYPE) in PLACE;                           // the value is in another field
 ///     name = KIND(&TYPE) by |model| ...;                     // the value is calculated when it is read
 ///     name = KIND(&TYPE) from PLACE;                         // Model::calculate writes the value to a field
-///     name as "any text" = KIND(&TYPE) in PLACE by |model| ...;  // set in a field, but calculated when it is read
+///     name as "any text" = KIND(&TYPE) by |model| ...;       // a name that Rust does not allow
 /// }
 /// ```
 ///
 /// A kind is a function of [`Variable`]: `input`, `output`, `local`, `parameter`, `calculated_parameter`,
 /// `independent`. A refinement is one of its methods; its arguments name other variables by their names in the table.
-/// A PLACE is a path of fields, such as `motors[0].theta`. The start values are the values in the model that
-/// [`Model::new`](crate::Model::new) returns.
+/// A PLACE is a path of fields, such as `motors[0].theta`.
+///
+/// The macro derives [`Clone`] for the struct and implements [`Default`] with the start values. A field without a start value
+/// starts with the default of its type, which is 0 for a number. [`Model::new`](crate::Model::new) is needed only if a start
+/// value depends on another one, or on files and other data of the instance.
+///
+/// With `for Model` instead of `pub struct Model`, the table belongs to a struct that is defined elsewhere. Its lines have a
+/// PLACE instead of a TYPE, and the start values are the values in the model that `Model::new` returns.
 ///
 /// Access to a Real is fastest if its place is an `f64` in a path of fields and array elements, and if there is no
 /// block after `then`: no function call is needed then. A path through a `Box`, a `Vec` or an implementation of
@@ -462,29 +477,25 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// table contains an array, all its names must follow the structured naming convention (section 2.2.9 of FMI 2.0),
 /// for example `motor.current`, `axes[1].angle`, `'any text'`.
 ///
-/// Of the model, a serialized state contains the fields after `in` and the `memory`; see [`Saved`](crate::Saved). List
+/// Of the model, a serialized state contains the fields of the variables and the `memory`; see [`Saved`](crate::Saved). List
 /// in `memory` all other values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects
 /// models in which such a value is missing.
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
 /// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, unless `names` gives it another
-/// name, which is necessary if a module contains two models. [`Variables::index`] returns the index of a name in the
+/// name, which is necessary for the second model in a module. [`Variables::index`] returns the index of a name in the
 /// table.
 ///
 /// ```
 /// use fmu_export::{NUMBER, variables};
 ///
-/// #[derive(Clone, Default)]
-/// pub struct Lag {
-///     u: f64,
-///     x: f64,
-/// }
-///
-/// variables! { for Lag;
+/// variables! {
+///     /// x' = u - x.
+///     pub struct Lag;
 ///     /// Input
-///     u = input(&NUMBER) in u;
+///     u: f64 = input(&NUMBER);
 ///     /// Output, follows the input
-///     x = output(&NUMBER).state() in x;
+///     x: f64 = output(&NUMBER).state().start(0.5);
 ///     /// Its rate
 ///     der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |lag| lag.u - lag.x;
 /// }
@@ -492,9 +503,52 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// use fmu_export::Variables;
 /// assert_eq!(Lag::TABLE[Lag::index(Name::der_x)].name(), "der(x)");
 /// assert_eq!(Lag::TABLE[Lag::index(Name::x)].description(), "Output, follows the input");
+/// assert_eq!(Lag::default().x, 0.5);
 /// ```
 #[macro_export]
 macro_rules! variables {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis struct $model:ident $( {
+            $( $(#[$more_attribute:meta])* $more_visibility:vis $more:ident : $more_type:ty $( = $more_start:expr )? ),* $(,)?
+        } )?
+        $(, names $names:ident )?
+        $(, memory in $( $memory:ident $([ $memory_at:expr ])* $( . $memory_field:tt $([ $memory_index:expr ])* )* ),+ )? ;
+        $(
+            $(#[doc = $text:literal])*
+            $name:ident $( as $label:literal )? $( : $type:ty )? =
+                $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
+                $( in $first:tt $([ $at:expr ])* $( . $field:tt $([ $index:expr ])* )* )?
+                $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_index:expr ])* )* )?
+                $( then | $changed:ident | $after:block )?
+                $( from $from:tt $([ $from_at:expr ])* $( . $from_field:tt $([ $from_index:expr ])* )* )?
+                $( by $calculate:expr )? ;
+        )+
+    ) => {
+        // Each list of refinements becomes one token tree, which can be repeated together with the type of the field.
+        $crate::variables! {
+            @struct [$(#[$attribute])* $visibility] $model
+            [$($( [$(#[$more_attribute])* $more_visibility] $more [$more_type] [$( . start ($more_start) )?] )*)?]
+            $( $name [$($type)?] [$( . $refinement $arguments )*] )+
+        }
+
+        $crate::variables! {
+            for $model
+            $(, names $names )?
+            $(, memory in $( $memory $([ $memory_at ])* $( . $memory_field $([ $memory_index ])* )* ),+ )? ;
+            $(
+                $(#[doc = $text])*
+                $name $( as $label )? =
+                    $kind $of $( . $refinement $arguments )*
+                    $( in $name : ($type) )?
+                    $( in $first $([ $at ])* $( . $field $([ $index ])* )* )?
+                    $( then $mark $([ $mark_at ])* $( . $mark_field $([ $mark_index ])* )* )?
+                    $( then | $changed | $after )?
+                    $( from $from $([ $from_at ])* $( . $from_field $([ $from_index ])* )* )?
+                    $( by $calculate )? ;
+            )+
+        }
+    };
     (
         for $model:ty
         $(, names $names:ident )?
@@ -504,7 +558,7 @@ macro_rules! variables {
             $name:ident $( as $label:literal )? =
                 $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
-                    in $first:tt $([ $at:expr ])* $( . $field:tt $([ $index:expr ])* )*
+                    in $first:tt $([ $at:expr ])* $( . $field:tt $([ $index:expr ])* )* $( : ($type:ty) )?
                     $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_index:expr ])* )* )?
                     $( then | $changed:ident | $after:block )?
                 )?
@@ -543,12 +597,28 @@ macro_rules! variables {
             unsafe impl $crate::Variables for $model {
                 type Name = $crate::variables!(@name $($names)?);
 
+                // An inherent constant takes precedence over the constant of a trait, but exists only if its bound holds.
+                const START: ::core::option::Option<fn() -> Self> = {
+                    struct Of<T>(::core::marker::PhantomData<T>);
+                    trait Without<T> {
+                        const START: ::core::option::Option<fn() -> T> = ::core::option::Option::None;
+                    }
+                    impl<T> Without<T> for Of<T> {}
+                    #[allow(dead_code)]
+                    impl<T: ::core::default::Default> Of<T> {
+                        const START: ::core::option::Option<fn() -> T> =
+                            ::core::option::Option::Some(<T as ::core::default::Default>::default);
+                    }
+                    Of::<Self>::START
+                };
+
                 const LINES: &'static [$crate::Variable<Self>] = &[$({
                     let variable = {
                         #[allow(unused_imports)]
                         use index::*;
                         $crate::variables!(
-                            @refined [$crate::Variable::<$model>::$kind $of] $( . $refinement $arguments )*
+                            @refined [$( $( $type )? )?] [$crate::Variable::<$model>::$kind $of]
+                            $( . $refinement $arguments )*
                         )
                     };
                     // Below, each field is bound to a variable of its own name, so that the compiler's messages refer
@@ -701,7 +771,37 @@ macro_rules! variables {
             }
         };
     };
-    (@names [] $($variants:tt)+) => { $crate::variables! { @names [Name] $($variants)+ } };
+    (
+        @struct [$($declaration:tt)*] $model:ident
+        [$( [$($more_declaration:tt)*] $more:ident [$more_type:ty] $more_start:tt )*]
+        $( $name:ident [$($type:ty)?] $refinements:tt )+
+    ) => {
+        #[derive(::core::clone::Clone)]
+        $($declaration)* struct $model {
+            $( $( $name: $type, )? )+
+            $( $($more_declaration)* $more: $more_type, )*
+        }
+
+        impl ::core::default::Default for $model {
+            /// The start values in the table.
+            fn default() -> Self {
+                Self {
+                    $( $( $name: $crate::variables!(@start $type; $refinements), )? )+
+                    $( $more: $crate::variables!(@start $more_type; $more_start), )*
+                }
+            }
+        }
+    };
+    // Two enums called `Name` in a module would cause eight errors, none of which states the remedy, but the name of a module
+    // can state it.
+    (@names [] $($variants:tt)+) => {
+        #[doc(hidden)]
+        mod a_second_table_in_a_module_needs_names {
+            $crate::variables! { @names [Name] $($variants)+ }
+        }
+        #[doc(inline)]
+        pub use a_second_table_in_a_module_needs_names::Name;
+    };
     (@names [$names:ident] $($variants:tt)+) => {
         /// Names of the variables: the identifiers at the start of the lines of `variables!`, which generates this
         /// enum. `names` in `variables!` sets the name of the enum.
@@ -714,12 +814,26 @@ macro_rules! variables {
     };
     (@name) => { Name };
     (@name $names:ident) => { $names };
-    (@refined [$($variable:tt)+]) => { $($variable)+ };
-    (@refined [$($variable:tt)+] . depends_on ($($known:ident),* $(,)?) $($rest:tt)*) => {
-        $crate::variables!(@refined [$($variable)+ . depends_on(&[$($known),*])] $($rest)*)
+    (@refined $type:tt [$($variable:tt)+]) => { $($variable)+ };
+    (@refined $type:tt [$($variable:tt)+] . depends_on ($($known:ident),* $(,)?) $($rest:tt)*) => {
+        $crate::variables!(@refined $type [$($variable)+ . depends_on(&[$($known),*])] $($rest)*)
     };
-    (@refined [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
-        $crate::variables!(@refined [$($variable)+ . $refinement $arguments] $($rest)*)
+    (@refined [] [$($variable:tt)+] . start $arguments:tt $($rest:tt)*) => {
+        ::core::compile_error!(
+            "start(...) needs the type of a field, as in `name: f64 = parameter(&NUMBER).start(0.5);` in a table that begins \
+             with `struct`; the start values of other fields are in Model::new"
+        )
+    };
+    (@refined $type:tt [$($variable:tt)+] . start $arguments:tt $($rest:tt)*) => {
+        $crate::variables!(@refined $type [$($variable)+] $($rest)*)
+    };
+    (@refined $type:tt [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
+        $crate::variables!(@refined $type [$($variable)+ . $refinement $arguments] $($rest)*)
+    };
+    (@start $type:ty; []) => { <$type as ::core::default::Default>::default() };
+    (@start $type:ty; [. start ($start:expr $(,)?) $($rest:tt)*]) => { $start };
+    (@start $type:ty; [. $refinement:ident $arguments:tt $($rest:tt)*]) => {
+        $crate::variables!(@start $type; [$($rest)*])
     };
     (@instead_of $before:tt $instead:expr) => { $instead };
     (@calculated $variable:ident $model:ty, $calculate:expr) => {

@@ -20,6 +20,18 @@ mod capability_not_implemented {
     offer!(Plant: CoSimulation);
 }
 
+// A start value has the type of its field.
+mod start_of_another_type {
+    use fmu_export::*;
+
+    variables! {
+        /// A model
+        pub struct Plant;
+        /// An input
+        u: f64 = input(&NUMBER).start(1);
+    }
+}
+
 // A capability must be named only once.
 mod capability_twice {
     include!("shared/model.rs");

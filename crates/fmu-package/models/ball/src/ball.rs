@@ -2,19 +2,6 @@
 
 use fmu_export::*;
 
-/// A ball that falls and bounces off the floor, slower each time, and ends the simulation after some bounces.
-#[derive(Clone)]
-pub struct Ball {
-    height: f64,
-    velocity: f64,
-    gravity: f64,
-    restitution: f64,
-    bounces: i32,
-    most_bounces: i32,
-    /// Greatest height until the next bounce.
-    apex: f64,
-}
-
 const HEIGHT: Type = Type::real("Height", &Unit::new("m").m(1));
 const VELOCITY: Type = Type::real("Velocity", &Unit::new("m/s").m(1).s(-1));
 const ACCELERATION: Type = Type::real("Acceleration", &Unit::new("m/s2").m(1).s(-2)).min(1e-3).max(1e3);
@@ -22,23 +9,29 @@ const RATE: Type = Type::real("Rate", &Unit::new("m/s2").m(1).s(-2));
 const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
 const COUNT: Type = Type::integer("Count").min_integer(0);
 
-variables! { for Ball, memory in apex;
+variables! {
+    /// A ball that falls and bounces off the floor, slower each time, and ends the simulation after some bounces.
+    pub struct Ball {
+        /// Greatest height until the next bounce.
+        apex: f64 = 1.0,
+    }, memory in apex;
+
     /// Height above the floor
-    height = output(&HEIGHT).state() in height;
+    height: f64 = output(&HEIGHT).state().start(1.0);
     /// Upward velocity
-    velocity = output(&VELOCITY).state().reinit() in velocity;
+    velocity: f64 = output(&VELOCITY).state().reinit();
     /// Rate of the height
     der_height as "der(height)" = local(&VELOCITY).derivative_of(height) by |ball| ball.velocity;
     /// Rate of the velocity
     der_velocity as "der(velocity)" = local(&RATE).derivative_of(velocity) by |ball| -ball.gravity;
     /// Gravitational acceleration
-    gravity = parameter(&ACCELERATION) in gravity;
+    gravity: f64 = parameter(&ACCELERATION).start(9.81);
     /// Ratio of the speeds after and before a bounce
-    restitution = parameter(&RATIO) in restitution;
+    restitution: f64 = parameter(&RATIO).start(0.7);
     /// Number of bounces
-    bounces = output(&COUNT).exact() in bounces;
+    bounces: i32 = output(&COUNT).exact();
     /// Number of bounces that ends the simulation
-    most_bounces = parameter(&COUNT) in most_bounces;
+    most_bounces: i32 = parameter(&COUNT).start(5);
 }
 
 impl Model for Ball {
@@ -51,11 +44,6 @@ impl Model for Ball {
         },
         ..info!("Ball", "ball")
     };
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        let (height, velocity, gravity) = (1.0, 0.0, 9.81);
-        Ok(Self { height, velocity, gravity, restitution: 0.7, bounces: 0, most_bounces: 5, apex: height })
-    }
 }
 
 impl Ball {

@@ -2,18 +2,14 @@
 
 use fmu_export::*;
 
-/// x' = u - x.
-#[derive(Clone, Default)]
-pub struct Lag {
-    u: f64,
-    x: f64,
-}
+variables! {
+    /// x' = u - x.
+    pub struct Lag;
 
-variables! { for Lag;
     /// Input
-    u = input(&NUMBER) in u;
+    u: f64 = input(&NUMBER);
     /// Output, follows the input
-    x = output(&NUMBER).state() in x;
+    x: f64 = output(&NUMBER).state();
     /// Its rate
     der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |lag| lag.u - lag.x;
 }
@@ -25,10 +21,6 @@ impl Model for Lag {
         smooth: true,
         ..info!("Lag", "lag")
     };
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self::default())
-    }
 }
 
 impl CoSimulation for Lag {

@@ -2,28 +2,6 @@
 
 use fmu_export::*;
 
-/// A DC motor with pulse-width modulation: the duty is the part of each period in which the supply is on.
-#[derive(Clone)]
-pub struct Motor {
-    duty: f64,
-    load: f64,
-    current: f64,
-    speed: f64,
-    on: bool,
-    supply: f64,
-    resistance: f64,
-    inductance: f64,
-    constant: f64,
-    inertia: f64,
-    period: f64,
-    /// Time of the next switching, s.
-    next: f64,
-    /// Whether the next switching begins a period.
-    rises: bool,
-    /// Start of the current period, s.
-    begin: f64,
-}
-
 const VOLTAGE: Type = Type::real("Voltage", &Unit::new("V").kg(1).m(2).s(-3).A(-1)).min(0.0);
 const CURRENT: Type = Type::real("Current", &Unit::new("A").A(1)).nominal(10.0);
 const CURRENT_RATE: Type = Type::real("CurrentRate", &Unit::new("A/s").A(1).s(-1));
@@ -39,17 +17,27 @@ const INERTIA: Type = Type::real("Inertia", &units::KG_M2).min(1e-6).max(1e3);
 const PERIOD: Type = Type::real("Period", &units::S).min(1e-5).max(1.0);
 const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
 
-variables! { for Motor, memory in next, rises, begin;
+variables! {
+    /// A DC motor with pulse-width modulation: the duty is the part of each period in which the supply is on.
+    pub struct Motor {
+        /// Time of the next switching, s.
+        next: f64,
+        /// Whether the next switching begins a period.
+        rises: bool = true,
+        /// Start of the current period, s.
+        begin: f64,
+    }, memory in next, rises, begin;
+
     /// Part of each period in which the supply is on, limited to 0 and 1
-    duty = input(&RATIO) in duty;
+    duty: f64 = input(&RATIO).start(0.5);
     /// Torque that brakes the shaft
-    load = input(&TORQUE) in load;
+    load: f64 = input(&TORQUE);
     /// Current through the winding
-    current = output(&CURRENT).state() in current;
+    current: f64 = output(&CURRENT).state();
     /// Speed of the shaft
-    speed = output(&SPEED).state() in speed;
+    speed: f64 = output(&SPEED).state();
     /// Whether the supply is on
-    on = output(&BOOLEAN).exact() in on;
+    on: bool = output(&BOOLEAN).exact();
     /// Rate of the current
     der_current as "der(current)" = local(&CURRENT_RATE).derivative_of(current)
         by |motor| motor.rates([motor.current, motor.speed])[0];
@@ -57,17 +45,17 @@ variables! { for Motor, memory in next, rises, begin;
     der_speed as "der(speed)" = local(&ACCELERATION).derivative_of(speed)
         by |motor| motor.rates([motor.current, motor.speed])[1];
     /// Voltage of the supply
-    supply = parameter(&VOLTAGE) in supply;
+    supply: f64 = parameter(&VOLTAGE).start(24.0);
     /// Resistance of the winding
-    resistance = parameter(&RESISTANCE) in resistance;
+    resistance: f64 = parameter(&RESISTANCE).start(0.5);
     /// Inductance of the winding
-    inductance = parameter(&INDUCTANCE) in inductance;
+    inductance: f64 = parameter(&INDUCTANCE).start(1e-3);
     /// Torque per ampere, and voltage per rad/s
-    constant = parameter(&CONSTANT) in constant;
+    constant: f64 = parameter(&CONSTANT).start(0.05);
     /// Inertia of the shaft and the load
-    inertia = parameter(&INERTIA) in inertia;
+    inertia: f64 = parameter(&INERTIA).start(2e-4);
     /// Time between the starts of two periods
-    period = parameter(&PERIOD) in period;
+    period: f64 = parameter(&PERIOD).start(1e-3);
 }
 
 impl Motor {
@@ -110,26 +98,6 @@ impl Model for Motor {
         },
         ..info!("Motor", "motor")
     };
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        let (supply, resistance, inductance, constant, inertia) = (24.0, 0.5, 1e-3, 0.05, 2e-4);
-        Ok(Self {
-            duty: 0.5,
-            load: 0.0,
-            current: 0.0,
-            speed: 0.0,
-            on: false,
-            supply,
-            resistance,
-            inductance,
-            constant,
-            inertia,
-            period: 1e-3,
-            next: 0.0,
-            rises: true,
-            begin: 0.0,
-        })
-    }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
         self.begin = experiment.start_time;

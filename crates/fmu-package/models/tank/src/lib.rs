@@ -14,31 +14,6 @@ enumeration! {
     }
 }
 
-/// A tank with a pump that is on or off.
-#[derive(Clone)]
-pub struct Tank {
-    inflow: f64,
-    valve: Valve,
-    bucket: bool,
-    level: f64,
-    pumping: bool,
-    switches: i32,
-    area: f64,
-    pump: f64,
-    low: f64,
-    high: f64,
-    poured: f64,
-    levels: [f64; 4],
-    flows: [f64; 4],
-    /// The time at which the pump was switched last, s.
-    since: f64,
-    /// The value of the input `bucket` at the last event.
-    was_poured: bool,
-    /// The time to which the other values belong, s.
-    time: f64,
-    log: Log,
-}
-
 const LEVEL: Type = Type::real("Level", &Unit::new("m").m(1)).min(0.0).max(100.0);
 const RATE: Type = Type::real("Velocity", &Unit::new("m/s").m(1).s(-1)).nominal(0.01);
 const M3_PER_S: Unit = Unit::new("m3/s").m(3).s(-1).display("l/min", 60_000.0, 0.0);
@@ -48,21 +23,32 @@ const VOLUME: Type = Type::real("Volume", &Unit::new("m3").m(3)).min(0.0).max(1e
 const DURATION: Type = Type::real("Time", &units::S);
 const VALVE: Type = Type::enumeration("Valve", <Valve as Enumeration>::ITEMS);
 
-variables! { for Tank, memory in since, was_poured;
+variables! {
+    /// A tank with a pump that is on or off.
+    pub struct Tank {
+        /// The time at which the pump was switched last, s.
+        since: f64,
+        /// The value of the input `bucket` at the last event.
+        was_poured: bool,
+        /// The time to which the other values belong, s.
+        time: f64,
+        log: Log,
+    }, memory in since, was_poured;
+
     /// From other sources
-    inflow = input(&FLOW) in inflow;
+    inflow: f64 = input(&FLOW);
     /// Position of the valve
-    valve = input(&VALVE) in valve;
+    valve: Valve = input(&VALVE).start(Valve::Open);
     /// When it becomes true, a bucket is emptied into the tank
-    bucket = input(&BOOLEAN) in bucket;
+    bucket: bool = input(&BOOLEAN);
     /// Above the bottom
-    level = output(&LEVEL).state().reinit() in level;
+    level: f64 = output(&LEVEL).state().reinit().start(1.0);
     /// Rate of the level
     der_level as "der(level)" = local(&RATE).derivative_of(level) by |tank| tank.rate(tank.level);
     /// Whether the pump is on
-    pumping = output(&BOOLEAN).exact() in pumping;
+    pumping: bool = output(&BOOLEAN).exact();
     /// The number of times that the pump was switched
-    switches = output(&INTEGER).exact() in switches;
+    switches: i32 = output(&INTEGER).exact();
     /// The time at which the pump was switched last
     switched_at = output(&DURATION).discrete() by |tank| tank.since;
     /// Time since the pump was switched
@@ -70,19 +56,19 @@ variables! { for Tank, memory in since, was_poured;
     /// Name of the mode
     mode = output(&STRING) by |tank| if tank.pumping { "filling" } else { "draining" }.to_owned();
     /// Cross section
-    area = parameter(&AREA) in area;
+    area: f64 = parameter(&AREA).start(1.0);
     /// Flow of the pump
-    pump = parameter(&FLOW) in pump;
+    pump: f64 = parameter(&FLOW).start(0.03);
     /// The pump starts here
-    low = parameter(&LEVEL) in low;
+    low: f64 = parameter(&LEVEL).start(0.5);
     /// The pump stops here
-    high = parameter(&LEVEL) in high;
+    high: f64 = parameter(&LEVEL).start(1.5);
     /// Content of the bucket
-    poured = parameter(&VOLUME) in poured;
+    poured: f64 = parameter(&VOLUME).start(0.2);
     /// Points of the characteristic, rising
-    levels = parameter(&LEVEL) in levels;
+    levels: [f64; 4] = parameter(&LEVEL).start([0.0, 1.0, 2.0, 3.0]);
     /// Flows through the open valve at these levels
-    flows = parameter(&FLOW) in flows;
+    flows: [f64; 4] = parameter(&FLOW).start([0.0, 0.01, 0.02, 0.03]);
 }
 
 impl Tank {
@@ -112,28 +98,6 @@ impl Model for Tank {
         },
         ..info!("Tank", "tank")
     };
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self {
-            inflow: 0.0,
-            valve: Valve::Open,
-            bucket: false,
-            level: 1.0,
-            pumping: false,
-            switches: 0,
-            area: 1.0,
-            pump: 0.03,
-            low: 0.5,
-            high: 1.5,
-            poured: 0.2,
-            levels: [0.0, 1.0, 2.0, 3.0],
-            flows: [0.0, 0.01, 0.02, 0.03],
-            since: 0.0,
-            was_poured: false,
-            time: 0.0,
-            log: Log::default(),
-        })
-    }
 
     fn update(&mut self) -> Result<(), Error> {
         if !self.levels.is_sorted_by(|one, next| one < next) {
