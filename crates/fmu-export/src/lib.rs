@@ -24,6 +24,7 @@ mod instance;
 mod integrate;
 mod log;
 mod lookup;
+mod memory;
 mod model;
 mod offsets;
 mod saved;

@@ -5,6 +5,7 @@ use super::{Component, ImporterLog, forget_panic, panic_message};
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, reject};
 use crate::log::{Logger, Message};
+use crate::memory::reserve_box;
 use crate::model::Setup;
 use crate::stamp::stamp;
 use fmi_abi::Status;
@@ -36,12 +37,13 @@ pub(crate) fn instantiate<M: Exported>(
     super::webassembly::keep_panics();
     let make = || {
         let (importer, standard) = (log(), arguments.importer.standard);
-        let rejection = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {
-            Ok(Ok(mut instance)) => {
+        let made = || Ok((reserve_box()?, make_instance::<M>(arguments)?));
+        let rejection = match catch_unwind(AssertUnwindSafe(made)) {
+            Ok(Ok((memory, mut instance))) => {
                 instance.logger.take().iter().for_each(|message| importer.deliver(message));
-                return Some(Box::new(Component::new(instance, importer)));
+                return Some(memory.fill(Component::new(instance, importer)));
             }
-            Ok(Err(rejection)) => rejection.message,
+            Ok::<Outcome<_>, _>(Err(rejection)) => rejection.message,
             Err(panic) => {
                 let message = format!("internal failure ({})", panic_message(&*panic));
                 forget_panic(Err(panic));

@@ -4,7 +4,7 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{in_slice, out_slice, out_value};
+use super::{in_slice, out_slice, out_value, reserve};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
@@ -64,7 +64,9 @@ pub unsafe fn serialize<M: Exported, Byte>(
             "the state needs {needed} bytes, the buffer has {size}; ask for its size first"
         ));
     }
-    let mut written = vec![0; needed];
+    let mut written = Vec::new();
+    reserve(&mut written, needed)?;
+    written.resize(needed, 0);
     instance.serialize(state.addr(), &mut written)?;
     bytes.iter_mut().zip(written).for_each(|(byte, written)| {
         byte.write(written);

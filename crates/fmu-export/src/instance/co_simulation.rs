@@ -93,7 +93,7 @@ impl<M: Exported> Instance<M> {
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
-        if let Some(before) = &self.rollback {
+        if let Some([before]) = self.rollback.as_deref() {
             self.state.undo(before);
         }
         why
@@ -170,7 +170,7 @@ impl<M: Exported> Instance<M> {
             return Ok(self.stay(point));
         }
         if (Self::ENDS_EARLY || !Self::IS_ATOMIC)
-            && let Some(before) = &mut self.rollback
+            && let Some([before]) = self.rollback.as_deref_mut()
         {
             before.back_up(&self.state);
         }

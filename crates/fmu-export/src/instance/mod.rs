@@ -24,6 +24,7 @@ use self::sorted::Sorted;
 use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::log::Logger;
+use crate::memory::{Boxed, try_box};
 use crate::model::{Error, Experiment, Setup};
 use crate::offsets::Placed;
 use crate::stamp::new_model;
@@ -51,7 +52,7 @@ pub(crate) struct Instance<M> {
     saved: saved_states::SavedStates<M>,
     /// Backup of the state at the start of the last step, if a failed step may have to be undone; see
     /// [`needs_undo`](Self::needs_undo).
-    rollback: Option<Box<State<M>>>,
+    rollback: Option<Boxed<State<M>>>,
     /// Strings that the last call has returned, which the importer may read until the next call.
     pub strings: Vec<std::ffi::CString>,
     /// Binary values that the last call has returned, which the importer may read until the next call.
@@ -178,7 +179,7 @@ impl<M: Exported> Instance<M> {
             fmi_state: FmiState::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
-            rollback: needs_undo.then(|| Box::new(state.clone())),
+            rollback: needs_undo.then(|| try_box(state.clone())).transpose()?,
             state,
             rejected: Sorted::new(),
             saved: handles::Handles::new(),

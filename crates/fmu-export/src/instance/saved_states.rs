@@ -4,6 +4,7 @@ use super::handles::{Handles, NULL};
 use super::origin::Origin;
 use super::{Instance, Outcome, State, reject, serialized};
 use crate::export::Exported;
+use crate::memory::{Boxed, try_box};
 use fmi_abi::{Interface, Mode};
 
 /// States that the importer has saved. Handles are looked up and never dereferenced, so a wrong handle cannot corrupt
@@ -11,7 +12,7 @@ use fmi_abi::{Interface, Mode};
 /// slot has been freed.
 ///
 /// The instance owns the states. When it is freed, they are freed too (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
-pub(super) type SavedStates<M> = Handles<Box<State<M>>>;
+pub(super) type SavedStates<M> = Handles<Boxed<State<M>>>;
 
 impl<M: Exported> Instance<M> {
     fn origin(&self) -> Origin {
@@ -36,7 +37,7 @@ impl<M: Exported> Instance<M> {
     }
 
     fn insert(&mut self, state: State<M>) -> Outcome<usize> {
-        match self.saved.insert(Box::new(state)) {
+        match self.saved.insert(try_box(state)?) {
             Some(handle) => Ok(handle),
             None => reject("the instance has too many saved states; free some"),
         }
@@ -104,7 +105,7 @@ impl<M: Exported> Instance<M> {
 }
 
 fn find<M>(saved: &mut SavedStates<M>, handle: usize) -> Outcome<&mut State<M>> {
-    saved.get_mut(handle).map_or_else(|| reject_handle(handle), |state| Ok(&mut **state))
+    saved.get_mut(handle).map_or_else(|| reject_handle(handle), |state| Ok(&mut state[0]))
 }
 
 #[cold]
