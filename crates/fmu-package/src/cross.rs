@@ -4,7 +4,7 @@ use crate::packages::cargo;
 use crate::platform::Platform;
 use anyhow::{Result, bail};
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// A wrapper for cargo that brings a linker for every system.
@@ -26,12 +26,24 @@ pub const TARGETS: [&str; 5] = [
 /// have newer ones.
 pub const GLIBC: &str = "2.17";
 
-/// Checks that the tools for these targets are installed; the error lists all missing tools and how to install them. cargo-zigbuild
-/// is required only with `all`, because the user's cargo configuration may have a linker for a single target.
+/// Checks that the tools for these targets are installed; the error lists all missing tools and how to install them, before anything
+/// is compiled. cargo-zigbuild is required only with `all`, because a single target may have another linker.
 pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     let mut missing = Vec::new();
-    for target in targets.iter().filter(|target| !has_std(target)) {
-        missing.push(format!("Rust's library for {target}: rustup target add {target}"));
+    for target in targets {
+        if !has_std(target) {
+            missing.push(format!("Rust's library for {target}: rustup target add {target}"));
+        }
+        if !all
+            && target.ends_with("-windows-gnu")
+            && needs_zigbuild(target)
+            && !runs(ZIGBUILD)
+            && !has_linker(target)
+        {
+            missing.push(format!(
+                "a linker for {target}: pip install {ZIGBUILD} (brings zig), or MinGW (on Debian: apt install gcc-mingw-w64)"
+            ));
+        }
     }
     if all && !runs(ZIGBUILD) {
         missing.push(
@@ -68,6 +80,19 @@ fn needs_zigbuild(target: &str) -> bool {
         _ if target.contains("-linux-gnu") => true,
         _ => Platform::host().ok() != Platform::of_target(target).ok(),
     }
+}
+
+/// Whether the user has named a linker for a target, in an environment variable or in a configuration file of cargo.
+fn has_linker(target: &str) -> bool {
+    let variable = format!("CARGO_TARGET_{}_LINKER", target.to_uppercase().replace('-', "_"));
+    let current = std::env::current_dir().unwrap_or_default();
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
+    let directories = current.ancestors().map(|directory| directory.join(".cargo")).chain(home);
+    let mut files =
+        directories.flat_map(|directory| ["config.toml", "config"].map(|name| directory.join(name)));
+    std::env::var_os(variable).is_some()
+        || files.any(|file| std::fs::read_to_string(file).is_ok_and(|text| text.contains(target)))
 }
 
 /// Whether the compiler has the standard library of a target. Returns true if the compiler cannot be started, because cargo then reports

@@ -354,6 +354,53 @@ fn other_packages_are_rejected() {
     assert!(output.contains("could not find `Cargo.toml`"), "{output}");
 }
 
+/// If cargo or this program cannot write a file, the message states the reason, and no part of a model remains.
+#[test]
+#[cfg(unix)]
+fn a_new_model_is_complete_or_absent() {
+    let directory = Directory::new();
+    let program = env!("CARGO_BIN_EXE_cargo-fmu");
+    for (limit, reason) in [("0", "SIGXFSZ"), ("1", "SIGXFSZ")] {
+        let command = format!("trap - XFSZ; ulimit -f {limit}; exec {program} fmu new lag");
+        let output = directory.run("", "sh", &["-c", &command]);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            errors.starts_with("error: ") && errors.contains(reason) && errors.lines().count() == 1,
+            "{errors}"
+        );
+        assert!(!directory.path("lag").exists());
+    }
+    directory.prints("", &["new", "lag"]);
+}
+
+/// The linker is missing before anything is compiled, if neither MinGW nor cargo-zigbuild is in `PATH`.
+#[test]
+#[cfg(unix)]
+fn a_missing_linker_is_reported_first() {
+    let directory = Directory::new();
+    directory.prints("", &["new", "lag"]);
+    let tools = directory.path("tools");
+    fs::create_dir(&tools).unwrap();
+    for tool in ["cargo", "rustc"] {
+        let output = directory.run("", "sh", &["-c", &format!("command -v {tool}")]);
+        let found = String::from_utf8(output.stdout).unwrap();
+        std::os::unix::fs::symlink(found.trim(), tools.join(tool)).unwrap();
+    }
+    let target = "x86_64-pc-windows-gnu";
+    let build = format!(
+        "PATH={} exec {} fmu build --target {target}",
+        tools.display(),
+        env!("CARGO_BIN_EXE_cargo-fmu")
+    );
+    let output = directory.run("lag", "sh", &["-c", &build]);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        !output.status.success() && errors.contains(&format!("a linker for {target}: pip install")),
+        "{errors}"
+    );
+    assert!(!errors.contains("Compiling"), "{errors}");
+}
+
 /// A clone may be copied together with the compiled program, which must then not name the original.
 #[test]
 #[cfg(unix)]

@@ -57,10 +57,15 @@ impl Begin {
     }
 }
 
-/// Creates the crate.
+/// Creates the crate. After an error, the new directory is removed, because a part of a model would only be in the way.
 pub fn new(options: &Options) -> Result<()> {
     let directory = &options.path;
     ensure!(!directory.exists(), "{} exists already; name a new directory", directory.display());
+    create(options).inspect_err(|_| _ = fs::remove_dir_all(directory))
+}
+
+fn create(options: &Options) -> Result<()> {
+    let directory = &options.path;
     let name = match &options.name {
         Some(name) => name.clone(),
         None => directory.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -78,6 +83,8 @@ pub fn new(options: &Options) -> Result<()> {
         command.output().with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
+        // Cargo has no message if a signal ends it, for example because a file exceeds a limit.
+        ensure!(!text.trim().is_empty(), "cargo new failed: {}", output.status);
         bail!("{}", text.trim().trim_start_matches("error: "));
     }
     let crate_name = name.replace('-', "_");
