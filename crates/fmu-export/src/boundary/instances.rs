@@ -37,13 +37,16 @@ pub(crate) fn instantiate<M: Exported>(
     super::webassembly::keep_panics();
     let make = || {
         let (importer, standard) = (log(), arguments.importer.standard);
-        let made = || Ok((reserve_box()?, make_instance::<M>(arguments)?));
-        let rejection = match catch_unwind(AssertUnwindSafe(made)) {
-            Ok(Ok((memory, mut instance))) => {
-                instance.logger.take().iter().for_each(|message| importer.deliver(message));
-                return Some(memory.fill(Component::new(instance, importer)));
-            }
-            Ok::<Outcome<_>, _>(Err(rejection)) => rejection.message,
+        let memory = reserve_box();
+        let rejection = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {
+            Ok(Ok(mut instance)) => match memory {
+                Ok(memory) => {
+                    instance.logger.take().iter().for_each(|message| importer.deliver(message));
+                    return Some(memory.fill(Component::new(instance, importer)));
+                }
+                Err(error) => error.to_string(),
+            },
+            Ok(Err(rejection)) => rejection.message,
             Err(panic) => {
                 let message = format!("internal failure ({})", panic_message(&*panic));
                 forget_panic(Err(panic));
