@@ -71,32 +71,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="ANGLE",
         help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
     )
-    for kind, effect in (
-        ("delay", "come late"),
-        ("lag", "lag, to first order"),
-        ("gain", "read too much or too little"),
-        ("drift", "drift slowly"),
-    ):
-        parser.add_argument(
-            f"--{kind}",
-            type=listed,
-            default="",
-            metavar="NAMES",
-            help=f"channels that may {effect}, separated by commas; the {kind} is estimated, too",
-        )
-    for kind, what in (
-        ("friction", "places with dry friction (N.m)"),
-        ("backlash", "springs with backlash (rad), or the motors"),
-        ("cubic", "springs with the torque k (twist + cubic twist^3), cubic in 1/rad2"),
-        ("crosstalk", "torques to which the other one adds a share"),
-    ):
-        parser.add_argument(
-            f"--{kind}",
-            type=listed,
-            default="",
-            metavar="PLACES",
-            help=f"{what}; the size is estimated, too: {', '.join(KINDS[kind].places)}",
-        )
+    channels = {
+        "delay": "come late",
+        "lag": "lag, to first order",
+        "gain": "read too much or too little",
+        "drift": "drift slowly",
+    }
+    places = {
+        "friction": "places with dry friction (N.m)",
+        "backlash": "springs with backlash (rad), or the motors",
+        "cubic": "springs with the torque k (twist + cubic twist^3), cubic in 1/rad2",
+        "crosstalk": "torques to which the other one adds a share",
+    }
+    effects = {
+        kind: ("NAMES", f"channels that may {effect}, separated by commas; the {kind} is estimated, too")
+        for kind, effect in channels.items()
+    } | {
+        kind: ("PLACES", f"{what}; the size is estimated, too: {', '.join(KINDS[kind].places)}")
+        for kind, what in places.items()
+    }
+    for kind, (metavar, explained) in effects.items():
+        parser.add_argument(f"--{kind}", type=listed, default="", metavar=metavar, help=explained)
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
     )
