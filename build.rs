@@ -9,6 +9,7 @@ use std::{env, fs};
 #[path = "src/parameters/mod.rs"]
 mod parameters;
 
+#[allow(dead_code)]
 #[path = "src/parameters/file.rs"]
 mod file;
 

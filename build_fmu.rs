@@ -33,7 +33,10 @@ fn main() -> ExitCode {
         .long("parameters")
         .value_name("FILE")
         .value_parser(value_parser!(PathBuf))
-        .help("Build in the parameters of this file [default: modelDescription/parameters.json, Table 1]")
+        .help(
+            "Build in the parameters of this file, and use_omega and start_at_rest if it has them [default: \
+             modelDescription/parameters.json, Table 1]",
+        )
         .display_order(0);
     let command = BuildOptions::command("build_fmu", ABOUT, "cargo run --bin build_fmu [-- OPTIONS]");
     exit(run(&command.arg(parameters).after_help(EXAMPLES).get_matches()))
@@ -45,7 +48,7 @@ fn run(matches: &ArgMatches) -> Result<()> {
         None => None,
     };
     let start = match &other {
-        Some(path) => file::read(path).map_err(Error::msg)?.start_values(),
+        Some(path) => file::read_start_values(path).map_err(Error::msg)?,
         // The library is compiled with Table 1.
         None => Vec::new(),
     };

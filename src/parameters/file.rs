@@ -17,28 +17,61 @@ use std::path::Path;
 /// value. In Python, `value * (180 / math.pi)` gives the same bits.
 const DEG_PER_RAD: f64 = 180.0 / PI;
 
-/// Reads and checks a parameter file.
+/// Boolean parameters, which a file for `build_fmu` may contain in addition to Table 1. Some importers set every parameter as a
+/// Real, so their users can only build these values into the FMU.
+const SWITCHES: [&str; 2] = ["start_at_rest", "use_omega"];
+
+/// Reads and checks Table 1, or a file with the same parameters.
 ///
 /// # Errors
 /// The message names the file and the fault, and the parameter if the fault concerns one.
 pub fn read(file: &Path) -> Result<Parameters, String> {
+    named(file, |json| parse(json, &[]).map(|(parameters, _)| parameters))
+}
+
+/// Reads and checks a file that may also contain [`SWITCHES`]. Returns its start values by name.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_start_values(file: &Path) -> Result<Vec<(String, String)>, String> {
+    named(file, |json| {
+        let (parameters, switches) = parse(json, &SWITCHES)?;
+        Ok([parameters.start_values(), switches].concat())
+    })
+}
+
+/// Passes the content of a file to `parse`, and names the file in the message of an error.
+fn named<T>(file: &Path, parse: impl FnOnce(&str) -> Result<T, String>) -> Result<T, String> {
     let name = file.display();
     let json = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
     parse(&json).map_err(|error| format!("{name}: {error}"))
 }
 
-fn parse(json: &str) -> Result<Parameters, String> {
+/// Returns the parameters in SI units, and the values of those `switches` that the file contains.
+fn parse(json: &str, switches: &[&str]) -> Result<(Parameters, Vec<(String, String)>), String> {
     let file: Object<Object<Value>> = serde_json::from_str(json).map_err(|error| error.to_string())?;
-    let parameters = from_file(&file)?;
+    let parameters = from_file(&file, switches)?;
     parameters.check().map_err(|error| format!("in SI units: {error}"))?;
-    Ok(parameters)
+    let mut values = Vec::new();
+    for (name, entry) in file.0.iter().filter(|(name, _)| switches.contains(&name.as_str())) {
+        let value = boolean(entry).map_err(|error| format!("{name}: {error}"))?;
+        values.push((name.clone(), value.to_string()));
+    }
+    Ok((parameters, values))
+}
+
+/// Returns the value of an entry like `{ "value": true }`.
+fn boolean(entry: &Object<Value>) -> Result<bool, String> {
+    entry.check_names(&["value", "meaning"])?;
+    let value = entry.member("value")?;
+    value.as_bool().ok_or_else(|| format!("the value is {value}; write true or false"))
 }
 
 macro_rules! file {
     ($($(#[$_meaning:meta])* $name:ident: $kind:ident $_compare:tt $_limit:literal, $unit:literal;)+) => {
-        /// Returns the parameters in SI units.
-        fn from_file(file: &Object<Object<Value>>) -> Result<Parameters, String> {
-            file.check_names(&[$(stringify!($name)),+])?;
+        /// Returns the parameters in SI units. The file may also contain `others`.
+        fn from_file(file: &Object<Object<Value>>, others: &[&str]) -> Result<Parameters, String> {
+            file.check_names(&[&[$(stringify!($name)),+], others].concat())?;
             Ok(Parameters {
                 $($name: in_unit(file.member(stringify!($name))?, $unit)
                     .map_err(|error| format!("{}: {error}", stringify!($name)))?,)+
@@ -162,7 +195,12 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::{parse, read, rust_expression};
+    use super::{Parameters, SWITCHES, read, rust_expression};
+
+    /// Returns the parameters of a file that may contain nothing else.
+    fn parse(json: &str) -> Result<Parameters, String> {
+        super::parse(json, &[]).map(|(parameters, _)| parameters)
+    }
 
     const TABLE_1: &str = include_str!("../../modelDescription/parameters.json");
 
@@ -265,6 +303,34 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn booleans_may_be_set_only_for_build_fmu() {
+        let with = |entry: &str| TABLE_1.replacen('{', &format!("{{ {entry},"), 1);
+        let read = |entry: &str| super::parse(&with(entry), &SWITCHES);
+        let (parameters, switches) =
+            read(r#""use_omega": { "value": true, "meaning": "rates are inputs" }"#).unwrap();
+        assert_eq!(parameters, parse(TABLE_1).unwrap());
+        assert_eq!(switches, [("use_omega".to_owned(), "true".to_owned())]);
+        assert_eq!(read(r#""start_at_rest": { "value": false }"#).unwrap().1[0].1, "false");
+        for (entry, message) in [
+            (r#""use_omega": { "value": 1 }"#, "use_omega: the value is 1; write true or false"),
+            (r#""use_omega": { "value": true, "unit": "1" }"#, "use_omega: unknown field `unit`"),
+            (r#""use_omega": {}"#, "use_omega: missing field `value`"),
+            (r#""use_omega": true"#, "use_omega: invalid type: boolean `true`, expected parameters like"),
+            (r#""omega1": { "value": true }"#, "unknown field `omega1`, expected one of `J2`, `J3`"),
+            (r#""M": { "value": 2, "unit": "1" }"#, "duplicate field `M`"),
+        ] {
+            let error = read(entry).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
+        // The library is compiled with Table 1 only, so the build script must not ignore a Boolean.
+        assert!(
+            parse(&with(r#""use_omega": { "value": true }"#))
+                .unwrap_err()
+                .contains("unknown field `use_omega`")
+        );
     }
 
     #[test]

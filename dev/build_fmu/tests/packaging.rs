@@ -184,6 +184,19 @@ fn other_parameters_are_other_start_values() {
         changed[0].starts_with(r#"<Real declaredType="RotationalSpringConstant" start="99.5" "#),
         "{changed:?}"
     );
+    // Importers that set every parameter as a Real cannot set these two.
+    let file = parameter_file(
+        directory.path(),
+        "\"value\": 4, \"unit\": \"1\"",
+        "\"value\": 2, \"unit\": \"1\" }, \"use_omega\": { \"value\": true",
+    );
+    let after = description(&["--parameters", &file]);
+    let changed: Vec<_> =
+        before.lines().zip(after.lines()).filter(|(a, b)| a != b).map(|(_, b)| b.trim()).collect();
+    assert_eq!(
+        changed,
+        [r#"<Integer declaredType="Integer_from_1" start="2" min="1"/>"#, r#"<Boolean start="true"/>"#]
+    );
     // The same values from another file give the same description.
     let copy = parameter_file(directory.path(), "meaning", "meaning");
     assert_eq!(description(&["--parameters", &copy]), before);
