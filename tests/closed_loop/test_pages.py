@@ -9,7 +9,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from unittest.mock import Mock, call, patch
+from unittest.mock import Mock, call, create_autospec, patch
 
 import fmpy.ssp
 import pytest
@@ -36,14 +36,38 @@ def test_the_programs(closed_loop, tmp_path, master, package):
     assert pitch == pytest.approx(30, abs=0.1) and roll == pytest.approx(60, abs=0.1)
 
 
+class SSP:
+    """Signatures of the class in the Python package OMSimulator (2940ef1, 2026-08, 3.0.0), as far as the script calls them."""
+
+    def addResource(self, filename, new_name=None, validate=True): ...
+    def addComponent(self, cref, resource): ...
+    def addConnection(self, cref1, cref2): ...
+    def instantiate(self): ...
+
+
+class InstantiatedModel:
+    """Signatures of the class of which `SSP.instantiate` returns an object."""
+
+    def setValue(self, cref, value): ...
+    def setFixedStepSize(self, stepSize): ...
+    def setStopTime(self, stopTime): ...
+    def setResultFile(self, filename, bufferSize=10): ...
+    def initialize(self): ...
+    def simulate(self): ...
+    def terminate(self): ...
+    def delete(self): ...
+
+
 def test_the_script_for_omsimulator(closed_loop):
-    """A mock of OMSimulator records the calls of the script, which must build the same system as the SSP."""
+    """OMSimulator cannot be installed from PyPI without its server. So a mock with the signatures of OMSimulator records the calls of
+    the script, which must build the same system as the SSP."""
     page = text_of(built("prw_testbed.fmu"))
     (script,) = re.findall(r'<pre data-script="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
-    library = Mock(CRef=lambda system, *names: ".".join(names))
+    loop, wrist = create_autospec(SSP, instance=True), create_autospec(InstantiatedModel, instance=True)
+    loop.instantiate.return_value = wrist
+    library = Mock(spec=("CRef", "SSP"), CRef=lambda system, *names: ".".join(names), SSP=lambda: loop)
     with patch.dict(sys.modules, {"OMSimulator": library}):
         exec(html.unescape(script), {})
-    loop, wrist = library.SSP(), library.SSP().instantiate()
     files = {f"resources/{fmu}": call(fmu, new_name=f"resources/{fmu}") for fmu in closed_loop.fmus.values()}
     assert sorted(loop.addResource.mock_calls) == sorted(files.values())
     assert dict(added.args for added in loop.addComponent.mock_calls) == {
