@@ -31,7 +31,7 @@ OUTPUTS = [
 
 @pytest.fixture(scope="session")
 def rods(tmp_path_factory) -> tuple[Path, Path]:
-    """The FMUs of crates/fmu-export/tests/models/rod.rs, for FMI 2.0 and FMI 3.0."""
+    """The FMUs of crates/fmu-test-kit/src/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     directory = tmp_path_factory.mktemp("rods")
     # Built with --workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]

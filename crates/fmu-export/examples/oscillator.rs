@@ -1,6 +1,6 @@
 //! The test model `Oscillator` as a shared library, which the C programs of the tests load.
 
-#[path = "../tests/models/oscillator.rs"]
+#[path = "../../fmu-test-kit/src/models/oscillator.rs"]
 mod oscillator;
 
 fmu_export::symbols!(oscillator::Oscillator);

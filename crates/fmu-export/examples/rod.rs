@@ -1,6 +1,6 @@
 //! The test model `Rod` as a shared library, for tests of importers that read arrays.
 
-#[path = "../tests/models/rod.rs"]
+#[path = "../../fmu-test-kit/src/models/rod.rs"]
 #[allow(dead_code, missing_docs)]
 mod rod;
 

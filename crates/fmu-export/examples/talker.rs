@@ -1,6 +1,6 @@
 //! The test model `Talker` as a shared library, which the C programs of the tests load as a second FMU.
 
-#[path = "../tests/models/talker.rs"]
+#[path = "../../fmu-test-kit/src/models/talker.rs"]
 mod talker;
 
 fmu_export::symbols!(talker::Talker);

@@ -3,7 +3,7 @@
 #![cfg(unix)]
 #![allow(missing_docs)]
 
-mod models;
+use fmu_test_kit::models;
 
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Mode::ContinuousTime;

@@ -1,7 +1,7 @@
 //! Random histories of the test models, and of the models of `cargo fmu new`.
 #![allow(missing_docs)]
 
-mod models;
+use fmu_test_kit::models;
 
 #[path = "../../fmu-package/models/house/src/house.rs"]
 mod house;

@@ -1,7 +1,7 @@
 //! Control loops with test models, which must not allocate, make system calls, or lock.
 #![allow(missing_docs)]
 
-mod models;
+use fmu_test_kit::models;
 
 fmu_test_kit::control_loop!(models::Oscillator);
 

@@ -1,7 +1,7 @@
 //! Test models with random calls in random order, and on several threads.
 #![allow(missing_docs)]
 
-mod models;
+use fmu_test_kit::models;
 
 use fmu_export::Interface::ModelExchange;
 use fmu_test_kit::fault_injection::{RunBytes, Tally, run, run_seeds};

@@ -2,7 +2,7 @@
 //! Valgrind and Miri, which detect more than the assertions.
 #![allow(missing_docs)]
 
-mod models;
+use fmu_test_kit::models;
 #[path = "boundary/valid_calls.rs"]
 mod valid_calls;
 

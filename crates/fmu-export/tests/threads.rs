@@ -1,11 +1,9 @@
 //! Importers that call one instance from two threads at the same time, although FMI forbids it.
 #![allow(missing_docs)]
 
-mod models;
-
 use fmu_export::*;
+use fmu_test_kit::models::{Talker, talker::Name};
 use fmu_test_kit::{Arguments, Either, Importer, fmi3};
-use models::{Talker, talker::Name};
 use std::ptr::null_mut;
 use std::sync::Barrier;
 

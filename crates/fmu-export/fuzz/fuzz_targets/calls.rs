@@ -2,14 +2,11 @@
 //! `fmu_test_kit::fault_injection` checks. The AddressSanitizer also detects invalid accesses to memory.
 #![no_main]
 
-#[path = "../../tests/models/mod.rs"]
-mod models;
-
 use fmu_test_kit::fault_injection::{RunBytes, Tally, run};
 use fmu_test_kit::{Importer, fmi3};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
-use models::*;
+use fmu_test_kit::models::*;
 
 /// Test models in FMI 2.0 and FMI 3.0. Add new models at the end, because the last byte of each input in
 /// `corpus.zip` selects a model by its index.

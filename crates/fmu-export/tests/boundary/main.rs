@@ -1,8 +1,7 @@
 //! Tests of the C functions of both FMI versions with test models.
 #![allow(missing_docs)]
 
-#[path = "../models/mod.rs"]
-mod models;
+use fmu_test_kit::models;
 
 use fmu_export::{Exported, Interface};
 

@@ -1,6 +1,6 @@
 //! The test model `Faulty` as a library, which a test converts to C sources.
 
-#[path = "../models/faulty.rs"]
+#[path = "../../../fmu-test-kit/src/models/faulty.rs"]
 #[allow(dead_code, reason = "only tests use some of its functions")]
 mod faulty;
 

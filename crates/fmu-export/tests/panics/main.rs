@@ -2,8 +2,7 @@
 //! other instances continue.
 #![allow(missing_docs)]
 
-#[path = "../models/mod.rs"]
-mod models;
+use fmu_test_kit::models;
 
 mod calls;
 
