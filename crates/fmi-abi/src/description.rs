@@ -60,6 +60,8 @@ pub struct Variable {
     pub declared_type: Option<String>,
     /// Index of the variable of which this variable is the time derivative.
     pub derivative_of: Option<usize>,
+    /// Whether an event may change the variable, which is a continuous state (attribute `reinit`).
+    pub reinit: bool,
     /// Whether the variable is clocked (attribute `clocks`).
     pub clocked: bool,
     /// Whether the variable may be set only once per time instant.
@@ -565,6 +567,7 @@ fn variable(
         is_relative: of_both("relativeQuantity").and_then(boolean) == Some(true),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
+        reinit: matches!(of_type.attribute("reinit"), Some("true" | "1")),
         clocked: node.attribute("clocks").is_some(),
         once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
         description: attribute_or_empty(node, "description"),

@@ -8,9 +8,10 @@
 //! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
 //! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `schema`,
-//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `schedule`,
+//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `activity`, `schedule`,
 //! `baseline`, `report`, `replay`.
 
+mod activity;
 mod always;
 mod baseline;
 mod call_sequence;
@@ -36,6 +37,7 @@ mod values;
 mod worker;
 mod writer;
 
+pub use activity::Progress;
 pub use checker::Unchecked;
 pub use finding::{Finding, Proof, Severity};
 pub use options::{FailOn, Options};
@@ -43,6 +45,7 @@ pub use replay::{ReplayOptions, replay};
 pub use report::Report;
 pub use worker::run_worker_if_requested;
 
+use activity::Activity;
 use anyhow::Context as _;
 use checker::Checker;
 use description::Description;
@@ -80,7 +83,8 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
             }
         };
     }
-    let progress = !options.json && std::io::stderr().is_terminal();
+    let shows = !options.json && std::io::stderr().is_terminal();
+    let progress = if shows { Progress::Line } else { Progress::None };
     worker::listen_for_interrupts();
     match check(fmu, options, progress).and_then(|report| {
         let text = match options.json {
@@ -136,7 +140,7 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Checks an FMU. If `progress` is set, a line on the standard error shows the progress.
+/// Checks an FMU, and shows the progress on the standard error.
 ///
 /// Returns when the time is over, or when the user interrupts the check, even if a check is still evaluating results: its thread then
 /// ends with the process.
@@ -144,10 +148,12 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
 /// # Errors
 /// Fails if the file is not an FMU of FMI 2.0 or 3.0, if the baseline cannot be read, or if a report or a temporary file cannot
 /// be written.
-pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
+pub fn check(path: &Path, options: &Options, progress: Progress) -> anyhow::Result<Report> {
     let begin = Instant::now();
+    let activity = Activity::begin(progress, path);
     let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
     let (scratch, mut checker) = opened(path, options, begin)?;
+    activity.set("simulates the model");
     simulate(&mut checker)?;
     let session = Arc::new(Session {
         path: path.to_owned(),
@@ -159,7 +165,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     });
     let work = std::thread::spawn({
         let session = Arc::clone(&session);
-        move || session.work(progress)
+        move || session.work(&activity)
     });
     while !work.is_finished() {
         if session.is_over() {
@@ -246,7 +252,7 @@ fn opened(
     Ok((scratch, checker))
 }
 
-/// Returns whether the options include a topic.
+/// Returns whether the options include a topic, or a rule that they name.
 fn is_wanted(options: &Options, topic: &str) -> bool {
     match options.only.is_empty() {
         true => !options.quick || !LONG.contains(&topic),
@@ -270,7 +276,7 @@ struct Session {
 
 impl Session {
     /// Executes the checks, and repeats the calls of their findings.
-    fn work(&self, progress: bool) -> anyhow::Result<()> {
+    fn work(&self, progress: &Activity) -> anyhow::Result<()> {
         let Self { options, checker, .. } = self;
         // The report is written after every check, so that earlier findings are not lost if this process is killed.
         let write_report = || match &options.out {
@@ -318,6 +324,7 @@ impl Session {
         let mut findings = self.checker.findings();
         let is_wanted_finding = |finding: &Finding| {
             is_wanted(&self.options, finding.topic())
+                || is_wanted(&self.options, &finding.name)
                 || ["arrays", "logs"].contains(&finding.topic())
                 || ALWAYS.contains(&finding.name.as_str())
         };

@@ -60,6 +60,10 @@ pub struct Options {
     /// Also checks interface types that start another program (needsExecutionTool); that program must be installed.
     #[arg(long)]
     pub execution_tool: bool,
+    /// Whether this is the check of a build: it makes the calls of a quick check, but in `time` and with `limit`, because a slow model
+    /// is not a mistake, and `only` may also name rules, whose findings are then reported if a check of a listed topic makes them.
+    #[arg(skip)]
+    pub is_build: bool,
 }
 
 /// The defaults of the command.
@@ -82,6 +86,7 @@ impl Default for Options {
             repeat: 1.5,
             no_shrink: false,
             execution_tool: false,
+            is_build: false,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Executes the checks of an FMU and proves its findings, on several threads.
 
+use crate::activity::Activity;
 use crate::checker::Checker;
 use crate::checks::{ALL, Check, malformed};
 use crate::finding::Finding;
@@ -8,7 +9,6 @@ use crate::rules::TOPICS;
 use crate::run::Stop;
 use crate::worker::interrupted;
 use crate::writer::Trajectory;
-use std::io::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -27,12 +27,12 @@ fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).min(8)
 }
 
-/// Calls `each` on several threads with every item and the number of items that have begun, until the check is closed. If `progress`
-/// is set, the line that `each` returns is printed.
+/// Calls `each` on several threads with every item and the number of items that have begun, until the check is closed. The line that
+/// `each` returns becomes the activity.
 fn in_parallel<T: Sync>(
     checker: &Checker,
     items: &[T],
-    progress: bool,
+    activity: &Activity,
     each: impl Fn(&T, usize) -> String + Sync,
 ) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -44,16 +44,13 @@ fn in_parallel<T: Sync>(
                     if checker.is_closed() {
                         break;
                     }
-                    if progress {
-                        eprint!("\r{line}");
-                        let _ = std::io::stderr().flush();
-                    }
+                    activity.set(&line);
                 }
             });
         }
     });
-    if progress && !checker.is_closed() {
-        eprint!("\r{:79}\r", "");
+    if !checker.is_closed() {
+        activity.set("");
     }
 }
 
@@ -76,7 +73,7 @@ fn execute_check(checker: &Checker, check: Check, trajectory: Option<&Trajectory
 /// check or `write_report` fails; a check that is stopped does not fail.
 pub fn execute_checks(
     checker: &Checker,
-    progress: bool,
+    activity: &Activity,
     wanted: &(impl Fn(&str) -> bool + Sync),
     write_report: &(impl Fn() -> anyhow::Result<()> + Sync),
 ) -> anyhow::Result<()> {
@@ -95,7 +92,7 @@ pub fn execute_checks(
         .collect();
     remaining.iter().for_each(|(topic, _)| checker.unchecked(topic, UNFINISHED.to_owned()));
     let failure = Mutex::new(None);
-    in_parallel(checker, &jobs, progress, |(topic, check, trajectory), done| {
+    in_parallel(checker, &jobs, activity, |(topic, check, trajectory), done| {
         let result = match execute_check(checker, *check, *trajectory) {
             Err(error) if error.is::<Stop>() || interrupted() => {
                 checker.stopped(topic, stop(&error));
@@ -119,10 +116,10 @@ pub fn execute_checks(
 
 /// Repeats the call sequences of all findings, the most severe first, and then shortens those that show their finding again. Each
 /// finding gets an equal share of the remaining time. What is not reproduced is only a note, so the repetitions come first.
-pub fn prove(checker: &Checker, findings: &[Mutex<Finding>], options: &Options, progress: bool) {
+pub fn prove(checker: &Checker, findings: &[Mutex<Finding>], options: &Options, activity: &Activity) {
     let each = |doing: &str, work: fn(&Checker, &mut Finding, Instant)| {
         let count = findings.len();
-        in_parallel(checker, findings, progress, |slot, number| {
+        in_parallel(checker, findings, activity, |slot, number| {
             let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
             let rounds = (count + 1 - number).div_ceil(threads());
             let share =

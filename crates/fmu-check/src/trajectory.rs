@@ -91,11 +91,18 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
             None => return Ok(up_to(trajectory, succeeded)),
             // The model has ended the simulation with Discard.
             Some(_) if discarded && succeeded >= 2 => return Ok(up_to(trajectory, succeeded)),
-            Some(why) if !discrete && reach == 1.0 => return Err(NoTrajectory(why, writer.sequence).into()),
+            Some(why) if !discrete && reach == 1.0 || is_fatal(&run, &ids) => {
+                return Err(NoTrajectory(why, writer.sequence).into());
+            }
             Some(_) => {}
         }
     }
     Ok(trajectory)
+}
+
+/// Returns whether one of these calls returned Fatal, which no value of an input excuses.
+fn is_fatal(run: &Run, ids: &[u32]) -> bool {
+    ids.iter().any(|id| run.status(*id) == Some(4))
 }
 
 /// Returns the number of steps before the first that fails, has an event, returns early or ends the simulation, and whether that
@@ -173,7 +180,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
         let run = checker.execute(&writer.sequence)?;
         made(checker, &run, &writer, before[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
-            let few = trajectory.points.len() < 3;
+            let few = trajectory.points.len() < 3 || is_fatal(&run, &here);
             return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
         }
         let advances = |id: &&u32| {

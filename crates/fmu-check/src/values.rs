@@ -89,6 +89,21 @@ pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
     inputs.map(value).collect()
 }
 
+/// Returns values of at most 1000 floating-point variables of these causalities that differ clearly from their start values.
+pub fn other_numbers(description: &Description, causalities: &[Causality]) -> Vec<(usize, Values)> {
+    let variables = description.variables.iter().enumerate().filter(|(_, variable)| {
+        causalities.contains(&variable.causality)
+            && variable.is_float()
+            && !variable.clocked
+            && variable.size == Some(variable.starts().len())
+    });
+    let values = variables.map(|(index, variable)| {
+        let other = |start: f64| near(variable, start, if start == 0.0 { 0.5 } else { 0.2 });
+        (index, Values::new(description.kind(index), variable.starts().into_iter().map(other)))
+    });
+    values.take(1000).collect()
+}
+
 /// Returns the number within the range of a variable that is nearest to `start + by * scale`. The scale is the nominal value or
 /// the magnitude of the start value (at most 1e6), whichever is larger, but at most the width of the range.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {

@@ -478,8 +478,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// for example `motor.current`, `axes[1].angle`, `'any text'`.
 ///
 /// Of the model, a serialized state contains the fields of the variables and the `memory`; see [`Saved`](crate::Saved). List
-/// in `memory` all other values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects
-/// models in which such a value is missing.
+/// in `memory` all other values that `initialize`, a step or an event changes. `cargo fmu build` rejects models
+/// in which such a value is missing.
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
 /// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, unless `names` gives it another

@@ -75,11 +75,6 @@ impl CallMonitor {
         }
     }
 
-    /// Records a fault, unless there was one before.
-    pub fn fail(&self, fault: String) {
-        lock(&self.fault).get_or_insert(fault);
-    }
-
     /// Receives the source location and the message of a panic from the library.
     ///
     /// # Safety

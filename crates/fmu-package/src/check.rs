@@ -51,6 +51,7 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
     let is_time = |variable: &Variable| variable.causality == Causality::Independent;
     ensure!(table.find(is_time).len() <= 1, "there are two independent variables (section 2.2.7 of FMI 2.0)");
     check_derivatives(table)?;
+    check_units(table)?;
     let starts = check_starts(table)?;
     check_model(model, &starts)?;
     Ok(starts)
@@ -304,6 +305,52 @@ fn check_derivatives(table: &Table) -> Result<()> {
         ensure!(count == 1, "the state {name} has {count} derivatives among the variables");
     }
     Ok(())
+}
+
+/// Rejects a derivative whose unit is not the unit of its state per second. A variable without a unit is not checked, and the radian
+/// may be left out.
+fn check_units(table: &Table) -> Result<()> {
+    for &(state, rate) in &table.states {
+        let of = |index: u32| table.variable(index).and_then(|variable| variable.variable_type.unit());
+        let (Some(unit), Some(unit_of_rate)) = (of(state), of(rate)) else { continue };
+        let has_unit = |unit: &Unit| unit.exponents.iter().any(|exponent| *exponent != 0);
+        if !has_unit(unit_of_rate) || !has_unit(unit) && unit.factor == 1.0 && unit.name != "1" {
+            continue;
+        }
+        let mut expected = unit.exponents.clone();
+        expected[2] -= 1;
+        let [expected, found] =
+            [&expected, &unit_of_rate.exponents].map(|exponents| with_exponents(exponents));
+        let [name, name_of_rate] = [state, rate].map(|index| table.name(index));
+        ensure!(
+            expected == found,
+            "{name_of_rate} is in {} ({found}), but {name} is in {}, so the unit of its derivative has the exponents {expected}",
+            unit_of_rate.name,
+            unit.name
+        );
+        ensure!(
+            (unit.factor - unit_of_rate.factor).abs() <= 1e-9 * unit.factor.abs(),
+            "{name_of_rate} is in {}, whose factor is {}, but {name} is in {}, whose factor is {}; importers integrate the numbers, so \
+             both factors must be equal",
+            unit_of_rate.name,
+            unit_of_rate.factor,
+            unit.name,
+            unit.factor
+        );
+    }
+    Ok(())
+}
+
+/// Returns exponents as they are written in a unit, without the radian: `kg.m2.s-2`.
+fn with_exponents(exponents: &[i64]) -> String {
+    let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
+    let factors = names.iter().zip(exponents).filter(|(_, exponent)| **exponent != 0);
+    let factors = factors.map(|(name, exponent)| match exponent {
+        1 => (*name).to_owned(),
+        _ => format!("{name}{exponent}"),
+    });
+    let text = factors.collect::<Vec<_>>().join(".");
+    if text.is_empty() { "none".to_owned() } else { text }
 }
 
 /// Returns the start values of a new model, after checking that they fit their types and are the same for each interface type. Also checks

@@ -2,6 +2,7 @@
 
 use crate::c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools, compiled_files};
 use crate::cargo::LibraryBuild;
+use crate::checker::{check, passed_checker};
 use crate::connectors::{Terminal, terminals};
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::describe::{Changes, describe};
@@ -65,6 +66,9 @@ pub struct Builder {
     pub variant: Option<String>,
     /// Additions to the page that runs the FMU.
     pub page: Page,
+    /// The program cargo-fmu, which checks each FMU before it gets its name. `None` packs without this check. `cargo fmu build` passes its
+    /// own path, also to the build program of a package.
+    pub checker: Option<PathBuf>,
 }
 
 /// The directory of the files that the model reads.
@@ -85,6 +89,7 @@ impl Builder {
             start: Vec::new(),
             variant: None,
             page: Page::default(),
+            checker: passed_checker(),
         }
     }
 
@@ -110,7 +115,8 @@ impl Builder {
         let _lock = lock(&target);
         let mut libraries = self.libraries(options)?;
         let time_limit = options.time_limit.map_or(TIME_LIMIT, Duration::from_secs);
-        let Variant { model, starts, _directory } = self.variant_of(&mut libraries, &target, time_limit)?;
+        let Variant { model, starts, library, directory } =
+            self.variant_of(&mut libraries, &target, time_limit)?;
         let module = if options.c_sources { Some(self.module()?) } else { None };
         let c_sources = |guid: &str| self.c_sources(module.as_deref(), guid, &starts, model.identifier());
         let source_files = module.as_ref().map_or(Vec::new(), |_| compiled_files(model.identifier()).into());
@@ -124,6 +130,23 @@ impl Builder {
         let mut descriptions = Vec::new();
         for &fmi in &versions {
             descriptions.push((fmi, self.describe(&model, fmi, &changes)?));
+        }
+        let content_without_page: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
+        if let Some(checker) = &self.checker {
+            for (fmi, description) in &descriptions {
+                let parts = Parts {
+                    fmi: *fmi,
+                    identifier: model.identifier(),
+                    description,
+                    terminals: None,
+                    libraries: std::slice::from_ref(&library),
+                    with_guid: &|_| Ok(Files::new()),
+                    content: &content_without_page,
+                };
+                let fmu = directory.path().join(format!("{}.fmu", model.identifier()));
+                pack(&fmu, &parts)?;
+                check(checker, &fmu, time_limit)?;
+            }
         }
         if versions.contains(&Standard::Fmi2) {
             join_for_macos(&mut libraries)?;
@@ -153,12 +176,12 @@ impl Builder {
             files.extend(html(guid)?.map(|html| (PAGE.to_owned(), html)));
             Ok(files)
         };
-        let content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
         let out = options.out.clone().unwrap_or_else(|| target.join("fmu"));
         for (fmi, description) in &descriptions {
             // If an FMU for FMI 2.0 has terminals, FMI Library reports a fatal mismatch, although it continues.
             let terminals = terminals.as_deref().filter(|_| *fmi == Standard::Fmi3);
-            let (identifier, libraries, content) = (model.identifier(), &libraries[..], &content[..]);
+            let (identifier, libraries) = (model.identifier(), &libraries[..]);
+            let content = &content_without_page[..];
             let with_guid = &with_guid;
             self.pack_in(
                 &out,
@@ -292,16 +315,17 @@ impl Builder {
         if !starts.is_empty() {
             model = load(&starts)?;
         }
-        let own = stamp(&own.bytes)?;
+        let own_stamp = stamp(&own.bytes)?;
         for library in libraries {
             ensure!(
-                stamp(&library.bytes)?.interface() == own.interface(),
+                stamp(&library.bytes)?.interface() == own_stamp.interface(),
                 "the library for {} has other variables than the model: it was compiled from other sources; compile it again",
                 library.platform
             );
             library.bytes = with_stamp(&library.bytes, NO_GUID, Some(&starts))?;
         }
-        Ok(Variant { model, starts, _directory: directory })
+        let bytes = with_stamp(&own.bytes, NO_GUID, Some(&starts))?;
+        Ok(Variant { model, starts, library: Library::new(host, bytes), directory })
     }
 
     /// Compiles the model to the WebAssembly module from which C sources are made.
@@ -361,8 +385,10 @@ struct Variant {
     model: LoadedModel,
     /// Index in the table and value.
     starts: Vec<(u32, f64)>,
+    /// The library for this machine, with the start values.
+    library: Library,
     /// Contains the loaded library.
-    _directory: TempDir,
+    directory: TempDir,
 }
 
 /// Waits until no other build runs in the same workspace, and returns a lock that lasts until the file is closed. Returns `None` if the

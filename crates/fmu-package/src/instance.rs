@@ -10,20 +10,13 @@ use fmi_abi::{BaseType, Interface, Standard, Value};
 /// The result of a call; the error is the message of the model.
 pub(crate) type Outcome<T = ()> = Result<T, String>;
 
-/// An instance, which owns its saved states.
+/// An instance.
 pub(crate) struct Instance<'a> {
     model: &'a LoadedModel,
     pub interface: Interface,
     standard: Standard,
     event_mode: bool,
     client: fmi_abi::client::Instance,
-    pub time: f64,
-}
-
-/// A saved state of an instance, and its time.
-#[derive(Clone, Copy)]
-pub(crate) struct Saved {
-    state: fmi_abi::client::Saved,
     pub time: f64,
 }
 
@@ -45,16 +38,6 @@ impl<'a> Instance<'a> {
         model.monitor.begin("the instantiation");
         let client = fmi_abi::client::Instance::new(model.functions(standard), &settings).map_err(message)?;
         Ok(Self { model, client, interface, standard, event_mode, time: 0.0 })
-    }
-
-    /// Returns the step size of the default experiment, s.
-    pub fn default_step_size(&self) -> f64 {
-        self.model.table.info.step_size
-    }
-
-    /// Returns whether steps may have any size.
-    pub fn has_variable_step_size(&self) -> bool {
-        self.model.table.co_simulation.as_ref().is_none_or(|offer| offer.variable_step_size)
     }
 
     /// Returns the client for a call, and records the call, which has this name in messages.
@@ -85,47 +68,6 @@ impl<'a> Instance<'a> {
         }
     }
 
-    /// Iterates the event in Model Exchange, and enters Continuous-Time Mode.
-    pub fn handle_event(&mut self) -> Outcome {
-        let before = self.states()?;
-        let event = self.client("event").event().map_err(message)?;
-        self.check_states(&before, event.states_changed)?;
-        if event.terminate {
-            return Err("the model ends the simulation".to_owned());
-        }
-        self.client("enter_continuous_time_mode").enter_continuous_time_mode().map_err(message)
-    }
-
-    /// Records a fault if an event has changed states but has not reported it, because importers then continue with the old values, or if
-    /// a changed state is not declared with `reinit`, because importers may then treat it as continuous.
-    fn check_states(&mut self, before: &[f64], declared: bool) -> Outcome {
-        let after = self.states()?;
-        let table = &self.model.table;
-        let pairs = table.states.iter().zip(before.iter().zip(&after));
-        for (&(state, _), (before, after)) in pairs.filter(|(_, (before, after))| before != after) {
-            let fault = if !declared {
-                "its result does not have `states_changed: true`, so importers continue with the old value"
-            } else if !table.variables[state as usize].reinit {
-                "its line does not have `.reinit()`, which importers need to know that it jumps"
-            } else {
-                continue;
-            };
-            let name = table.name(state);
-            self.model.monitor.fail(format!("an event changes {name} from {before} to {after}, but {fault}"));
-        }
-        Ok(())
-    }
-
-    pub fn enter_event_mode(&mut self) -> Outcome {
-        self.client("enter_event_mode").enter_event_mode().map_err(message)
-    }
-
-    pub fn set_time(&mut self, time: f64) -> Outcome {
-        self.client("set_time").set_time(time).map_err(message)?;
-        self.time = time;
-        Ok(())
-    }
-
     /// Does a step of Co-Simulation. Returns false if the model ends the simulation.
     pub fn step(&mut self, size: f64) -> Outcome<bool> {
         let time = self.time;
@@ -142,10 +84,6 @@ impl<'a> Instance<'a> {
                 None => Err(message(rejection)),
             },
         }
-    }
-
-    pub fn step_completed(&mut self) -> Outcome {
-        self.client("completed_integrator_step").completed_integrator_step().map(drop).map_err(message)
     }
 
     /// Sets first time derivatives of inputs, in FMI 2.0 only.
@@ -211,22 +149,6 @@ impl<'a> Instance<'a> {
                 || self.model.table.variable(**index).is_none_or(|variable| variable.element == 0)
         };
         indices.iter().filter(has_reference).map(|index| self.standard.reference(*index)).collect()
-    }
-
-    /// Sets variables of type Real, arrays as a whole.
-    pub fn set_reals(&mut self, indices: &[u32], values: &[f64]) -> Outcome {
-        let references = self.references(indices);
-        self.client("set_numbers").set_numbers(BaseType::Real, &references, values).map_err(message)
-    }
-
-    /// Returns the values of variables of type Real, arrays as a whole; NaN for a value that the model does not return.
-    pub fn reals(&mut self, indices: &[u32]) -> Vec<f64> {
-        let (references, mut values) = (self.references(indices), vec![f64::NAN; indices.len()]);
-        if self.client("get_numbers").get_numbers(BaseType::Real, &references, &mut values).is_err() {
-            let all = self.values();
-            return indices.iter().map(|index| all[*index as usize].real()).collect();
-        }
-        values
     }
 
     /// Returns the values of all variables; NaN for a value that the model does not return.
@@ -318,43 +240,6 @@ impl<'a> Instance<'a> {
 
     pub fn set_states(&mut self, states: &[f64]) -> Outcome {
         self.client("set_continuous_states").set_continuous_states(states).map_err(message)
-    }
-
-    pub fn derivatives(&mut self) -> Outcome<Vec<f64>> {
-        self.continuous(Continuous::Derivatives, self.model.table.states.len())
-    }
-
-    /// Returns the event indicators, and the nominal values of the states; NaN for those that the model does not return.
-    pub fn indicators_and_nominals(&mut self) -> Vec<f64> {
-        let counts = [self.model.table.indicators(), self.model.table.states.len()];
-        let kinds = [Continuous::EventIndicators, Continuous::Nominals];
-        let values = kinds
-            .into_iter()
-            .zip(counts)
-            .flat_map(|(what, count)| self.continuous(what, count).unwrap_or_else(|_| vec![f64::NAN; count]));
-        values.collect()
-    }
-
-    pub fn save(&mut self) -> Outcome<Saved> {
-        let state = self.client("save").save().map_err(message)?;
-        Ok(Saved { state, time: self.time })
-    }
-
-    pub fn restore(&mut self, saved: Saved) -> Outcome {
-        self.client("restore").restore(saved.state).map_err(message)?;
-        self.time = saved.time;
-        Ok(())
-    }
-
-    /// Returns a saved state as bytes.
-    pub fn serialize(&mut self, saved: Saved) -> Outcome<Vec<u8>> {
-        self.client("serialize").serialize(saved.state).map_err(message)
-    }
-
-    /// Restores a state from bytes.
-    pub fn deserialize(&mut self, bytes: &[u8], time: f64) -> Outcome {
-        let state = self.client("deserialize").deserialize(bytes).map_err(message)?;
-        self.restore(Saved { state, time })
     }
 }
 

@@ -13,15 +13,16 @@
 //! |---|---|
 //! | the sources | `directory`, `content`, `packages`, `sources` |
 //! | the model | `table`, `call_monitor`, `model`, `instance` |
-//! | checks of the model | `check`, `sample`, `saved_states`, `state_derivatives`, `partial_derivatives` |
+//! | checks of the model | `check`, `sample` |
 //! | the description | `structure`, `definitions`, `describe` |
 //! | the FMU | `connectors`, `platform`, `signature`, `library`, `starts`, `universal`, `fingerprint`, `pack` |
-//! | the command | `cross`, `c_sources`, `cargo`, `page_html`, `page`, `terminal`, `options`, `command` |
+//! | the command | `cross`, `c_sources`, `cargo`, `page_html`, `page`, `terminal`, `options`, `checker`, `command` |
 
 mod c_sources;
 mod call_monitor;
 mod cargo;
 mod check;
+mod checker;
 mod command;
 mod connectors;
 mod content;
@@ -38,14 +39,11 @@ mod pack;
 mod packages;
 mod page;
 mod page_html;
-mod partial_derivatives;
 mod platform;
 mod sample;
-mod saved_states;
 mod signature;
 mod sources;
 mod starts;
-mod state_derivatives;
 pub mod structure;
 mod table;
 pub mod terminal;
@@ -54,6 +52,7 @@ mod universal;
 pub use {
     c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools},
     cargo::LibraryBuild,
+    checker::pass_checker,
     command::{Builder, build},
     connectors::{Terminal, terminals},
     content::{ContentFile, content_files},

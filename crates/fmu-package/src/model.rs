@@ -7,11 +7,10 @@ use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::{c_char, c_void};
 use fmi_abi::calls::{Functions, Library};
 use fmi_abi::{BaseType, Standard, Value, fmi2, fmi3};
-use std::collections::HashSet;
 use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::null;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// The function of a library that describes its model; `fmu-export` declares it.
@@ -32,8 +31,6 @@ pub struct LoadedModel {
     pub(crate) groups: Vec<Group>,
     /// The start values by index of the variable, once the model has been checked.
     pub(crate) starts: OnceLock<Vec<Option<Value>>>,
-    /// The variables by which the partial derivatives were compared with differences, each with whether this was after initialization.
-    pub(crate) compared: Mutex<HashSet<(bool, u32)>>,
     /// The directory with the files that the model reads.
     resources: Option<CString>,
     pub(crate) monitor: Arc<CallMonitor>,
@@ -152,7 +149,6 @@ impl LoadedModel {
             functions: libraries.map(Arc::new),
             groups,
             starts: OnceLock::new(),
-            compared: Mutex::default(),
             resources,
             monitor,
         })

@@ -2,15 +2,12 @@
 //!
 //! The model is evaluated at points near its start values, which are the same in every build. If its equations are `smooth`, an unknown
 //! that does not react to a known at any point does not depend on it, unless its `depends_on` lists the known, and a factor that is the
-//! same at all points is constant. For other models this proves nothing, so an unknown depends on the variables in its `depends_on`, or
-//! on every known if it has no `depends_on`. The evaluations then only find wrong declarations.
+//! same at all points is constant. For other models this proves nothing, so they are not evaluated: an unknown depends on the variables in
+//! its `depends_on`, or on every known if it has no `depends_on`.
 
 use crate::check::{Starts, check};
 use crate::model::LoadedModel;
-use crate::partial_derivatives::check as check_derivatives;
 use crate::sample::{Point, Sampler, is_finite};
-use crate::saved_states;
-use crate::state_derivatives;
 use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
 use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability};
@@ -20,14 +17,12 @@ use std::fmt;
 /// Returns the start values of a model. The first call checks the model.
 ///
 /// # Errors
-/// When the model contradicts itself, or its saved states are incomplete.
+/// When the model contradicts itself.
 pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
     if let Some(starts) = model.starts.get() {
         return Ok(starts);
     }
     let starts = check(model)?;
-    state_derivatives::check(model, &starts)?;
-    saved_states::check(model, &starts)?;
     Ok(model.starts.get_or_init(|| starts))
 }
 
@@ -83,16 +78,13 @@ impl ModelStructure {
     /// or known in FMI 3.0: it has the index of its first element and the dependencies of all its elements.
     ///
     /// # Errors
-    /// When the model contradicts itself or rejects its start values, or when an unknown reacts to a variable that its `depends_on` does
-    /// not name. If the model is `smooth`, also when it rejects every change of a variable.
+    /// When the model contradicts itself or rejects its start values. If the model is `smooth`, also when it rejects every change of a
+    /// variable, and when an unknown reacts to a variable that its `depends_on` does not name.
     pub fn of(model: &LoadedModel, fmi: Standard, tunable_parameters: bool) -> Result<Self> {
         let starts = checked_starts(model)?;
         let table = &model.table;
         let Lists { outputs, derivatives, knowns, initial_unknowns, initial_knowns } = Lists::of(table, fmi);
         let unknowns = [&outputs[..], &derivatives].concat();
-        check_derivatives(model, starts, true, &unknowns, &knowns)?;
-        check_derivatives(model, starts, false, &initial_unknowns, &initial_knowns)?;
-
         let mut sampler = Sampler::new(model, starts.clone(), tunable_parameters);
         sampler.running = true;
         let running = found(&mut sampler, &unknowns, &knowns)?;
@@ -210,10 +202,15 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     Ok(Unknown { dependencies, ..found })
 }
 
-/// Returns the unknowns with the dependencies that the evaluations find: from the partial derivatives if the model provides them and
+/// Returns the unknowns with the dependencies that the evaluations of a smooth model find: from the partial derivatives if the model provides them and
 /// is running, else from changes of the values.
 fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let table = &sampler.model.table;
+    let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };
+    let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
+    if list.is_empty() || !table.info.smooth {
+        return Ok(list);
+    }
     let is_real =
         |index: u32| table.variable(index).is_some_and(|variable| variable.base() == BaseType::Real);
     let reals: Vec<u32> = unknowns.iter().copied().filter(|index| is_real(*index)).collect();
@@ -225,9 +222,7 @@ fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<
         let causality = table.variable(index).map(|variable| variable.causality);
         is_real(index) && !matches!(causality, Some(Causality::Independent | Causality::Parameter))
     };
-    let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };
-    let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
-    let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
+    let bases = sampler.bases()?;
     for (number, &known) in knowns.iter().enumerate() {
         sampler.model.monitor.progress("finds what depends on each variable", number, knowns.len());
         let differentiable = is_differentiable(known) && !reals.is_empty();
@@ -350,7 +345,6 @@ impl Sampler<'_> {
             reactions.values.push(unknowns.iter().map(pair).collect());
         }
         if let Some(message) = self.stuck.get(&known)
-            && table.info.smooth
             && reactions.changes.is_empty()
         {
             let name = table.name(known);

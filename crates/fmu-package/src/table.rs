@@ -255,14 +255,6 @@ impl Type {
             _ => None,
         }
     }
-
-    /// The nominal value of a Real, 1 if there is none.
-    pub fn nominal_or_one(&self) -> f64 {
-        match self.attributes {
-            Attributes::Real { nominal, .. } => nominal.unwrap_or(1.0),
-            _ => 1.0,
-        }
-    }
 }
 
 fn info(json: &Json) -> Result<Info> {

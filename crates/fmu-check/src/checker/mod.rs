@@ -75,8 +75,10 @@ impl Checker {
         options: &crate::options::Options,
         begin: Instant,
     ) -> Self {
-        let time = if options.quick { QUICK } else { options.time.max(1.0) };
-        let limit = if options.quick { options.limit.min(2.4) } else { options.limit };
+        let (time, limit) = match options.quick && !options.is_build {
+            true => (QUICK, options.limit.min(2.4)),
+            false => (options.time.max(1.0), options.limit),
+        };
         Self {
             readable: sample(&description, MAX_READ),
             description: Arc::new(description),

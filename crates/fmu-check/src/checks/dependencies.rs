@@ -101,7 +101,7 @@ fn unknowns<'a>(checker: &'a Checker, trajectory: &Trajectory) -> impl Iterator<
 /// in the middle of the simulation, also at the other points.
 pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let (knowns, states) = continuous_knowns(checker, trajectory);
-    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states, &[])?;
     for (known, value) in knowns.into_iter().zip(values) {
         let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
         if unknowns.is_empty() || value.is_empty() {
@@ -265,7 +265,7 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         unknowns(checker, trajectory).filter_map(|unknown| declared_kind(unknown, known)).collect()
     };
     knowns.retain(|known| description.variables[*known].size == Some(1) && !declared(*known).is_empty());
-    let (values, vector) = middle_values(checker, trajectory, &knowns, &states)?;
+    let (values, vector) = middle_values(checker, trajectory, &knowns, &states, &[])?;
     for (known, value) in knowns.into_iter().zip(values) {
         let variable = &description.variables[known];
         let Some(value) = value.first().copied().filter(|value| value.is_finite()) else { continue };

@@ -6,6 +6,9 @@ use crate::description::Description;
 use crate::writer::{Part, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Causality, Interface, Variability};
 
+/// Maximum number of knowns with respect to which derivatives are compared with differences.
+pub const MOST_KNOWNS: usize = 400;
+
 /// Returns whether a variable is a continuous scalar with double precision.
 pub fn is_continuous_scalar(description: &Description, index: usize) -> bool {
     let variable = &description.variables[index];
@@ -49,6 +52,13 @@ pub fn unknown_and_known(description: &Description, interface: Interface) -> Opt
 /// Returns the first half of the simulation, after which partial derivatives are requested.
 pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
     [Part::Begin, Part::Points(trajectory.points.len() / 2)]
+}
+
+/// Writes the first half of the simulation with these parameters.
+pub fn write_to_middle(writer: &mut Writer, parameters: &[(usize, Values)]) {
+    writer.write(0, &[Part::Make]);
+    writer.set(0, parameters);
+    writer.write(0, &[Part::Enter, Part::Leave, Part::Points(writer.trajectory.points.len() / 2)]);
 }
 
 /// Returns whether the FMU declares that it provides directional derivatives, and whether it declares adjoint derivatives.
@@ -109,16 +119,17 @@ pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: u
     }
 }
 
-/// Returns the values of each known, and the state vector, in the middle of a simulation. A list of values is empty if they cannot
+/// Returns the values of each known, and the state vector, in the middle of a simulation with these parameters. A list of values is empty if they cannot
 /// be read.
 pub fn middle_values(
     checker: &Checker,
     trajectory: &Trajectory,
     knowns: &[usize],
     states: &[usize],
+    parameters: &[(usize, Values)],
 ) -> anyhow::Result<(Vec<Vec<f64>>, Vec<f64>)> {
     let mut writer = checker.writer(trajectory);
-    writer.write(0, &to_middle(trajectory));
+    write_to_middle(&mut writer, parameters);
     let read = writer.read_these(0, knowns);
     let vector = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
     let run = checker.execute(&writer.sequence)?;

@@ -1,68 +1,135 @@
 //! Checks partial derivatives against central differences of the values that the FMU returns.
 
 use super::derivatives::{
-    declared, is_continuous_scalar, knowns, middle_values, names, numbers_if_ok, references,
-    request_derivatives, set_known, to_middle, unknowns,
+    MOST_KNOWNS, declared, is_continuous_scalar, knowns, middle_values, names, numbers_if_ok, references,
+    request_derivatives, set_known, to_middle, unknowns, write_to_middle,
 };
 use super::integration::{Integrated, integrate_with_events};
-use crate::call_sequence::Run;
+use crate::call_sequence::{Arg, Run, Values};
 use crate::checker::Checker;
-use crate::description::Variable;
-use crate::values::inputs_by;
+use crate::description::{Description, Unknown, Variable};
+use crate::trajectory::step_size;
+use crate::values::other_numbers;
 use crate::writer::{Part, Read, Trajectory, Writer, value_of};
+use fmi_abi::{BaseType, Causality};
 use std::sync::Arc;
 
-/// Checks derivatives against central differences in the middle of a simulation. Uses directional derivatives if
-/// `is_directional` is true, otherwise adjoint derivatives.
+/// Number of knowns in a call sequence.
+const TOGETHER: usize = 8;
+/// Maximum number of derivatives with respect to a known that are also requested one by one.
+const SINGLY: usize = 40;
+
+/// Checks derivatives against central differences in the middle of a simulation with these parameters. Uses directional derivatives if
+/// `is_directional` is true, otherwise adjoint derivatives. Compares only the derivatives that are not zero, or whose unknown is declared
+/// to depend on the known, because a model with many states has few of them.
 pub fn differences(
     checker: &Checker,
     trajectory: &Trajectory,
     unknowns: &[usize],
     knowns: &[usize],
     is_directional: bool,
+    parameters: &[(usize, Values)],
 ) -> anyhow::Result<()> {
     let description = &checker.description;
     let states = if trajectory.is_stepped() { Vec::new() } else { description.states() };
     if !trajectory.is_stepped() && states.len() != description.states_count().unwrap_or(0) {
         return Ok(());
     }
-    let (values, vector) = middle_values(checker, trajectory, knowns, &states)?;
-    for (known, value) in knowns.iter().zip(values) {
+    let (values, vector) = middle_values(checker, trajectory, knowns, &states, parameters)?;
+    let nonzero = nonzero(checker, trajectory, unknowns, knowns, parameters)?;
+    let mut compared = Vec::new();
+    for ((known, value), nonzero) in knowns.iter().zip(values).zip(nonzero) {
         let variable = &description.variables[*known];
         let value = value.first().copied().filter(|value| value.is_finite() && !variable.once_per_instant);
         let Some(value) = value else { continue };
         let Some(step) = step_in_range(variable, value) else { continue };
+        let listed = description.outputs.iter().chain(&description.derivatives);
+        let mut rows = dependents(description, listed, *known, unknowns);
+        rows.extend(nonzero.into_iter().map(|row| unknowns[row]));
+        rows.sort_unstable();
+        rows.dedup();
+        if !rows.is_empty() {
+            compared.push((*known, value, step, rows));
+        }
+    }
+    for group in compared.chunks(TOGETHER) {
         let mut writer = checker.writer(trajectory);
-        writer.write(0, &to_middle(trajectory));
-        let derivatives = request_column(
-            &mut writer,
-            &references(description, unknowns),
-            variable.reference,
-            is_directional,
-        );
-        let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
-            set_known(&mut writer, &states, &vector, *known, &[value + by]);
-            writer.read_these(0, unknowns)
-        });
-        let differences = Arc::new(Differences {
-            unknowns: unknowns.to_vec(),
-            itself: description.aliases(*known).collect(),
-            names: names(description, unknowns),
-            known: variable.name.clone(),
-            may_react_later: trajectory.is_stepped(),
-            step,
-            derivatives,
-            reads,
-        });
-        let precision = Arc::clone(&differences);
-        let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
+        write_to_middle(&mut writer, parameters);
+        let mut all = Vec::new();
+        for (known, value, step, rows) in group {
+            let reads = STEPS.map(|times| {
+                set_known(&mut writer, &states, &vector, *known, &[value + times * step]);
+                writer.read_these(0, rows)
+            });
+            let reference = description.variables[*known].reference;
+            let derivatives =
+                request_column(&mut writer, &references(description, rows), reference, is_directional);
+            all.push(Differences {
+                unknowns: rows.clone(),
+                itself: description.aliases(*known).collect(),
+                names: names(description, rows),
+                known: description.variables[*known].name.clone(),
+                may_react_later: trajectory.is_stepped(),
+                step: *step,
+                derivatives,
+                reads,
+            });
+        }
+        let all = Arc::new(all);
+        let precise = Arc::clone(&all);
+        let criterion = move |run: &Run| all.iter().find_map(|one| one.evaluate(run, 1e-4));
         let run = checker.evaluate("derivatives.directional", writer.sequence.clone(), criterion)?;
         if !checker.has("derivatives.directional") {
-            let criterion = move |run: &Run| precision.evaluate(run, 2e-7);
+            let criterion = move |run: &Run| precise.iter().find_map(|one| one.evaluate(run, 2e-7));
             checker.record("derivatives.precision", &run, &writer.sequence, criterion);
         }
     }
     Ok(())
+}
+
+/// The values of a known at which unknowns are read, as factors of the step that is added. The last one leaves the known unchanged.
+const STEPS: [f64; 5] = [1.0, -1.0, 0.5, -0.5, 0.0];
+
+/// Returns the unknowns of this list that are declared to depend on a known.
+fn dependents<'d>(
+    description: &Description,
+    listed: impl Iterator<Item = &'d Unknown>,
+    known: usize,
+    unknowns: &[usize],
+) -> Vec<usize> {
+    let aliases: Vec<usize> = description.aliases(known).collect();
+    let depends = |unknown: &&Unknown| {
+        let is_listed = |list: &Vec<usize>| list.iter().any(|index| aliases.contains(index));
+        unknown.dependencies.as_ref().is_none_or(is_listed)
+    };
+    let dependent = listed.filter(depends).map(|unknown| unknown.variable);
+    dependent.filter(|index| unknowns.contains(index)).collect()
+}
+
+/// Returns for each known the positions of the unknowns whose directional derivatives are not zero; none if a call fails.
+fn nonzero(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    unknowns: &[usize],
+    knowns: &[usize],
+    parameters: &[(usize, Values)],
+) -> anyhow::Result<Vec<Vec<usize>>> {
+    let mut writer = checker.writer(trajectory);
+    write_to_middle(&mut writer, parameters);
+    let [rows, columns] = [unknowns, knowns].map(|indices| references(&checker.description, indices));
+    let ids: Vec<u32> = columns
+        .iter()
+        .map(|known| {
+            let (name, count) = ("GetDirectionalDerivative", rows.len());
+            request_derivatives(&mut writer, name, &rows, &[*known], &[1.0], count)
+        })
+        .collect();
+    let run = checker.execute(&writer.sequence)?;
+    let rows = |id: u32| {
+        let column = numbers_if_ok(&run, id).unwrap_or_default();
+        (0..column.len()).filter(|row| column[*row] != 0.0).collect()
+    };
+    Ok(ids.into_iter().map(rows).collect())
 }
 
 /// Returns the step of the differences at a value; `None` if a step up or down leaves the range of the variable.
@@ -74,8 +141,8 @@ fn step_in_range(variable: &Variable, value: f64) -> Option<f64> {
     (is_in_range(value - step) && is_in_range(value + step)).then_some(step)
 }
 
-/// Checks the derivatives of initial unknowns with respect to inputs in Initialization Mode. They may differ from later derivatives, for
-/// example because initial states are computed from inputs.
+/// Checks the derivatives of initial unknowns with respect to inputs and exact variables in Initialization Mode. They may differ from later
+/// derivatives, for example because initial states are computed from inputs.
 pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let [has_directional, has_adjoint] = declared(checker, trajectory.interface);
@@ -86,33 +153,32 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     if !has_directional && !has_adjoint || unknowns.is_empty() {
         return Ok(());
     }
-    let inputs = inputs_by(description, 0.1)
-        .into_iter()
-        .filter(|(index, _)| is_continuous_scalar(description, *index));
-    for (known, value) in inputs.take(checker.at_most(8)) {
+    let values = other_numbers(description, &[Causality::Input, Causality::Parameter]).into_iter().filter(
+        |(index, _)| {
+            let variable = &description.variables[*index];
+            variable.base == Some(BaseType::Real) && variable.size == Some(1) && !variable.once_per_instant
+        },
+    );
+    for (known, value) in values.take(MOST_KNOWNS) {
         let variable = &description.variables[known];
-        let (value, step) = (value.numbers()[0], 1e-4 * variable.nominal.max(1e-3));
-        let parts = [Part::Make, Part::Enter];
+        let rows = dependents(description, description.initial_unknowns.iter(), known, &unknowns);
+        let value = value.numbers()[0];
+        let Some(step) = step_in_range(variable, value).filter(|_| !rows.is_empty()) else { continue };
         let mut writer = checker.writer(trajectory);
-        writer.write(0, &parts);
-        writer.set_numbers(0, known, &[value]);
-        let derivatives = request_column(
-            &mut writer,
-            &references(description, &unknowns),
-            variable.reference,
-            has_directional,
-        );
-        let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
-            writer.set_numbers(0, known, &[value + by]);
-            writer.read_these(0, &unknowns)
+        writer.write(0, &[Part::Make, Part::Enter]);
+        let reads = STEPS.map(|times| {
+            writer.set_numbers(0, known, &[value + times * step]);
+            writer.read_these(0, &rows)
         });
+        let derivatives =
+            request_column(&mut writer, &references(description, &rows), variable.reference, has_directional);
         let differences = Differences {
-            unknowns: unknowns.clone(),
             itself: description.aliases(known).collect(),
-            names: names(description, &unknowns)
+            names: names(description, &rows)
                 .into_iter()
                 .map(|name| format!("{name} in Initialization Mode"))
                 .collect(),
+            unknowns: rows,
             known: variable.name.clone(),
             may_react_later: true,
             step,
@@ -123,6 +189,46 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         checker.check("derivatives.directional", writer.sequence, criterion)?;
     }
     Ok(())
+}
+
+/// Checks the derivatives with respect to time in Model Exchange, in the middle of a simulation.
+pub fn by_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let is_time = |index: &usize| description.variables[*index].causality == Causality::Independent;
+    let Some(time) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
+    let unknowns = unknowns(description, trajectory.interface);
+    let listed = description.outputs.iter().chain(&description.derivatives);
+    let rows = dependents(description, listed, time, &unknowns);
+    let count = trajectory.points.len() / 2;
+    if !declared(checker, trajectory.interface)[0] || rows.is_empty() || count == 0 {
+        return Ok(());
+    }
+    let step = 1e-4 * step_size(description);
+    let middle = trajectory.points[count - 1].time + 2.0 * step;
+    let mut writer = checker.writer(trajectory);
+    writer.write(0, &to_middle(trajectory));
+    let read_at = |writer: &mut Writer, times: f64| {
+        writer.call(0, "SetTime", vec![Arg::real(middle + times * step)]);
+        writer.read_these(0, &rows)
+    };
+    // Time must not go back.
+    let [low, lower, center] = [-1.0, -0.5, 0.0].map(|times| read_at(&mut writer, times));
+    let variable = &description.variables[time];
+    let derivatives = request_column(&mut writer, &references(description, &rows), variable.reference, true);
+    let [higher, high] = [0.5, 1.0].map(|times| read_at(&mut writer, times));
+    let reads = [high, low, higher, lower, center];
+    let differences = Differences {
+        itself: vec![time],
+        names: names(description, &rows),
+        unknowns: rows,
+        known: variable.name.clone(),
+        may_react_later: false,
+        step,
+        derivatives,
+        reads,
+    };
+    let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
+    checker.check("derivatives.directional", writer.sequence, criterion)
 }
 
 /// Checks derivatives against differences after an event of an integration: a state event, or a time event if there is none.
@@ -142,31 +248,28 @@ pub fn after_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
     if !has_directional && !has_adjoint || unknowns.is_empty() {
         return Ok(());
     }
-    differences(checker, &up_to_event, &unknowns, &knowns, has_directional)
+    differences(checker, &up_to_event, &unknowns, &knowns, has_directional, &[])
 }
 
 /// Requests the derivatives of all unknowns with respect to one known, by one directional derivative or by an adjoint derivative for each
-/// unknown. Returns, for each unknown, the number of the call and the index in its result.
+/// unknown. Because the FMU rejects the directional derivative if it does not provide that of one unknown, also requests a few one by one.
+/// Returns, for each unknown, the numbers of the calls and the index in the result of each.
 fn request_column(
     writer: &mut Writer,
     unknowns: &[u32],
     known: u32,
     is_directional: bool,
-) -> Vec<(u32, usize)> {
-    if is_directional {
-        let id = request_derivatives(
-            writer,
-            "GetDirectionalDerivative",
-            unknowns,
-            &[known],
-            &[1.0],
-            unknowns.len(),
-        );
-        return (0..unknowns.len()).map(|row| (id, row)).collect();
-    }
-    let adjoint =
-        |row: &u32| (request_derivatives(writer, "GetAdjointDerivative", &[*row], &[known], &[1.0], 1), 0);
-    unknowns.iter().map(adjoint).collect()
+) -> Vec<Vec<(u32, usize)>> {
+    let name = if is_directional { "GetDirectionalDerivative" } else { "GetAdjointDerivative" };
+    let count = unknowns.len();
+    let column = is_directional.then(|| request_derivatives(writer, name, unknowns, &[known], &[1.0], count));
+    let is_single = !is_directional || (2..=SINGLY).contains(&count);
+    let mut derivative = |(row, unknown): (usize, &u32)| -> Vec<(u32, usize)> {
+        let single =
+            is_single.then(|| (request_derivatives(writer, name, &[*unknown], &[known], &[1.0], 1), 0));
+        column.map(|id| (id, row)).into_iter().chain(single).collect()
+    };
+    unknowns.iter().enumerate().map(&mut derivative).collect()
 }
 
 /// Calls for the derivatives with respect to one known, and the reads for the differences.
@@ -180,8 +283,8 @@ struct Differences {
     /// Whether unknowns may stay unchanged until a later call, such as the next step of Co-Simulation.
     may_react_later: bool,
     step: f64,
-    /// For each unknown, the number of the call for its derivative, and the index in the result of the call.
-    derivatives: Vec<(u32, usize)>,
+    /// For each unknown, the numbers of the calls for its derivative, and the index in the result of each call.
+    derivatives: Vec<Vec<(u32, usize)>>,
     /// Reads of the unknowns with +step, -step, +step/2, -step/2 and 0 added to the known.
     reads: [Vec<Read>; 5],
 }
@@ -198,9 +301,17 @@ impl Differences {
                 let value = value_of(run, reads, *unknown)?.numbers().first().copied();
                 value.filter(|number| number.is_finite())
             };
-            let values: Vec<f64> = self.reads.iter().map(number).collect::<Option<_>>()?;
-            let (id, index) = self.derivatives[row];
-            let derivative = numbers_if_ok(run, id)?.get(index).copied()?;
+            let Some(values) = self.reads.iter().map(number).collect::<Option<Vec<f64>>>() else { continue };
+            let derivative = |(id, index): &(u32, usize)| numbers_if_ok(run, *id)?.get(*index).copied();
+            let calls = &self.derivatives[row];
+            let Some(derivative) = calls.iter().find_map(derivative) else {
+                // A derivative that the FMU does not provide is not a mistake, unless the FMU states that it is not a number.
+                if let Some(why) = calls.last().and_then(|(id, _)| not_finite(run, *id)) {
+                    let (name, known) = (&self.names[row], &self.known);
+                    return Some(format!("the derivative of {name} with respect to {known}: {why}"));
+                }
+                continue;
+            };
             let (step, center) = (self.step, values[4]);
             let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
             // One-sided differences that disagree indicate a kink, where the derivative does not exist.
@@ -223,4 +334,11 @@ impl Differences {
         }
         None
     }
+}
+
+/// Returns the message of a rejected call that states that a result is not finite.
+fn not_finite(run: &Run, id: u32) -> Option<String> {
+    let outcome = run.outcome(id).filter(|outcome| outcome.status.is_some_and(|status| status > 1))?;
+    let texts = outcome.log.iter().filter_map(|message| message.text.as_ref());
+    texts.map(|text| String::from_utf8_lossy(text).into_owned()).find(|text| text.contains("finite"))
 }

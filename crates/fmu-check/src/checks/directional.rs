@@ -1,13 +1,15 @@
 //! Checks that directional and adjoint derivatives are consistent, and that they equal differences.
 
 use super::derivatives::{
-    declared, knowns, names, numbers_if_ok, references, request_derivatives, to_middle, unknowns,
+    MOST_KNOWNS, declared, knowns, names, numbers_if_ok, references, request_derivatives, to_middle, unknowns,
 };
 use super::differences::differences;
 use crate::call_sequence::Run;
 use crate::checker::Checker;
 use crate::finding::Criterion;
+use crate::values::other_numbers;
 use crate::writer::Trajectory;
+use fmi_abi::Causality;
 
 /// Checks partial derivatives in the middle of a simulation. Requesting them must not change a variable. Directional derivatives
 /// must be linear in the seed and independent of the order of the variables, and adjoint derivatives must be the transposed
@@ -15,8 +17,9 @@ use crate::writer::Trajectory;
 pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let [has_directional, has_adjoint] = declared(checker, trajectory.interface);
     let unknowns = unknowns(&checker.description, trajectory.interface);
-    let mut knowns = knowns(&checker.description, trajectory.interface);
-    knowns.truncate(checker.at_most(40));
+    let mut all_knowns = knowns(&checker.description, trajectory.interface);
+    all_knowns.truncate(MOST_KNOWNS);
+    let knowns = &all_knowns[..all_knowns.len().min(checker.at_most(40))];
     if !has_directional && !has_adjoint || unknowns.is_empty() || knowns.is_empty() {
         return Ok(());
     }
@@ -24,7 +27,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     writer.write(0, &to_middle(trajectory));
     let before = writer.read(0);
     let [unknown_references, known_references] =
-        [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
+        [&unknowns[..], knowns].map(|indices| references(&checker.description, indices));
     let mut request = |function: &str, seed: &[f64], count: usize| {
         request_derivatives(&mut writer, function, &unknown_references, &known_references, seed, count)
     };
@@ -47,7 +50,7 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     if run.end != crate::call_sequence::End::Done {
         return Ok(());
     }
-    let names = [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
+    let names = [&unknowns[..], knowns].map(|indices| names(&checker.description, indices));
     if let Some(sum) = sum {
         let criterion = is_linear(columns.clone(), sum, names[0].clone());
         checker.record("derivatives.linear", &run, &sequence, criterion);
@@ -58,7 +61,13 @@ pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         });
         order(checker, trajectory, &unknown_references, &known_references)?;
     }
-    differences(checker, trajectory, &unknowns, &knowns, has_directional)
+    // Mistakes may show only with other parameters, for example if two of them start with the same value.
+    let parameters = other_numbers(&checker.description, &[Causality::Parameter]);
+    differences(checker, trajectory, &unknowns, &all_knowns, has_directional, &[])?;
+    if parameters.is_empty() {
+        return Ok(());
+    }
+    differences(checker, trajectory, &unknowns, &all_knowns, has_directional, &parameters)
 }
 
 /// Returns the criterion that the derivatives for unit seeds (`columns`) add up to the derivative for a seed of ones (`sum`).

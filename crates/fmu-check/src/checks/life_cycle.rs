@@ -2,8 +2,9 @@
 //! time. Also checks the events of Model Exchange.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
-use crate::call_sequence::{Arg, NULL_INSTANCE, Step};
+use crate::call_sequence::{Arg, NULL_INSTANCE, Run, Step};
 use crate::checker::Checker;
+use crate::description::Variable;
 use crate::finding::{event, first_failure};
 use crate::random::Random;
 use crate::worker::MOST_UPDATES;
@@ -11,6 +12,7 @@ use crate::writer::Part::{
     self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,
 };
 use crate::writer::{LONG_NAME, Point, Trajectory, Writer};
+use std::sync::Arc;
 
 /// Checks that all calls of a sequence succeed.
 fn check_sequence(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
@@ -312,7 +314,8 @@ fn event_iteration(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     })
 }
 
-/// Checks that an event that changes states reports the change, because importers otherwise continue with the old states.
+/// Checks that an event that changes states reports the change, because importers otherwise continue with the old states, and that the
+/// description declares which states events change, because importers may treat the others as continuous.
 fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let count = checker.description.states_count().unwrap_or(0);
     if count == 0 {
@@ -330,16 +333,37 @@ fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<
         points.push((point.time, before, updates, after));
     }
     let fmi3 = checker.fmi3();
-    checker.check("life_cycle.states-changed", writer.sequence, move |run| {
+    // The variable of each element of the state vector.
+    let states = checker.description.states().into_iter();
+    let states: Vec<Variable> = states
+        .map(|index| checker.description.variables[index].clone())
+        .flat_map(|state| vec![state.clone(); state.size.unwrap_or(1)])
+        .collect();
+    let change = move |run: &Run, is_wrong: &dyn Fn(bool, Option<&Variable>) -> bool| {
         points.iter().find_map(|(time, before, updates, after)| {
             // The first and the last call enter and leave Event Mode. A failed update counts as reported, because it is another finding.
             let updates = &updates[1..updates.len() - 1];
             let is_reported = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
-            let (was, is) = (run.written(*before)?, run.written(*after)?);
-            let succeeded = [before, after].iter().all(|id| run.succeeds(**id));
-            let index = was.differ(is).filter(|_| succeeded && !updates.iter().any(is_reported))?;
-            let (was, is) = (was.show(index), is.show(index));
-            Some(format!("at {time:?} state {} was {was}, after the event it is {is}", index + 1))
+            let is_reported = updates.iter().any(is_reported);
+            let [was, is] = [before, after].map(|id| run.written(*id).filter(|_| run.succeeds(*id)));
+            let (was, is) = (was?, is?);
+            let differs = |index: &usize| was.part(*index, 1) != is.part(*index, 1);
+            let index = (0..count).filter(differs).find(|index| is_wrong(is_reported, states.get(*index)))?;
+            let name = states.get(index).map_or_else(|| format!("state {}", index + 1), |of| of.name.clone());
+            Some(format!(
+                "at {time:?} {name} was {}, after the event it is {}",
+                was.show(index),
+                is.show(index)
+            ))
         })
-    })
+    };
+    let change = Arc::new(change);
+    let silent = Arc::clone(&change);
+    let run = checker.evaluate("life_cycle.states-changed", writer.sequence.clone(), move |run| {
+        silent(run, &|is_reported, _| !is_reported)
+    })?;
+    checker.record("life_cycle.reinit", &run, &writer.sequence, move |run| {
+        change(run, &|is_reported, state| is_reported && state.is_some_and(|state| !state.reinit))
+    });
+    Ok(())
 }

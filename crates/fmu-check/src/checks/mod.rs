@@ -20,6 +20,7 @@ pub mod rejections;
 pub mod reset;
 pub mod resources;
 pub mod results;
+pub mod set_again;
 pub mod several;
 pub mod single_precision;
 pub mod small_steps;
@@ -30,6 +31,7 @@ pub mod start_values;
 pub mod state_values;
 pub mod states;
 pub mod status;
+pub mod step_derivatives;
 pub mod strings;
 pub mod vectors;
 
@@ -106,6 +108,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("derivatives", Each(Always, directional::directional)),
     ("derivatives", Each(Integrated, differences::after_events)),
     ("derivatives", Each(Always, differences::initial)),
+    ("derivatives", Each(Integrated, differences::by_time)),
     ("derivatives", Each(Integrated, vectors::vectors)),
     ("dependencies", Each(Always, dependencies::missing)),
     ("dependencies", Each(Always, dependencies::initial)),
@@ -126,6 +129,8 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Always, results::time)),
     ("results", Each(Stepped3, results::last_successful)),
     ("dynamics", Each(Stepped, small_steps::small_steps)),
+    ("dynamics", Each(Stepped, step_derivatives::steps)),
+    ("dynamics", Each(Always, set_again::set_again)),
     ("dynamics", Each(Stepped, late_outputs::late)),
     ("dynamics", Each(Integrated, stale::stale)),
     ("dynamics", Each(Integrated, event_inputs::integrated)),

@@ -5,8 +5,6 @@
 
 mod malformed;
 mod models;
-mod saved_states;
-mod state_derivatives;
 mod terminals;
 
 use fmi_abi::Category;

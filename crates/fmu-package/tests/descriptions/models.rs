@@ -629,8 +629,7 @@ pub mod faulty {
         /// Square of the input, plus the time
         y = output(&NUMBER).depends_on(&[u, Index::TIME]) by |model| {
             assert!(!has("unreadable"));
-            let offset = if has("not finite") { f64::NAN } else { model.time };
-            model.u * model.u + offset
+            model.u * model.u + model.time
         };
     }
 
@@ -671,28 +670,5 @@ pub mod faulty {
         }
     }
 
-    impl Partials for Faulty {
-        fn partial(&self, _: Name, _: Name) -> Option<f64> {
-            Some(
-                self.u
-                    * if has("partial") {
-                        2.001
-                    } else if has("no number") {
-                        f64::NAN
-                    } else {
-                        2.0
-                    },
-            )
-        }
-
-        fn initial_partial(&self, _: Name, _: Name) -> Option<f64> {
-            Some(self.u * if has("initial_partial") { 0.0 } else { 2.0 })
-        }
-
-        fn partial_by_time(&self, _: Name) -> Option<f64> {
-            Some(if has("partial_by_time") { 0.0 } else { 1.0 })
-        }
-    }
-
-    offer!(Faulty: CoSimulation + ModelExchange + Partials);
+    offer!(Faulty: CoSimulation + ModelExchange);
 }

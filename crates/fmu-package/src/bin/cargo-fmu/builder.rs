@@ -2,7 +2,7 @@
 
 use crate::project::Project;
 use anyhow::{Context, Result};
-use fmu_package::{BuildOptions, Builder, cargo};
+use fmu_package::{BuildOptions, Builder, cargo, pass_checker};
 use std::env;
 use std::ffi::OsString;
 use std::fs;
@@ -14,8 +14,17 @@ use std::process::Command;
 pub enum Purpose {
     /// For users: the library is compiled with the author's profile `release`.
     Release,
+    /// For a check that follows, which finds more than the check of a build.
+    Check,
     /// For the author: the library is compiled with settings for a short compile time.
     Development,
+}
+
+impl Purpose {
+    /// Returns this program if it must check the FMUs before they get their names.
+    fn checker(self) -> Result<Option<PathBuf>> {
+        (self == Self::Release).then(env::current_exe).transpose().context("cannot find this program")
+    }
 }
 
 /// Cargo settings for a short compile time.
@@ -34,20 +43,19 @@ pub fn build(
         let mut command = Command::new(cargo());
         command.args(["run", "--quiet", "--package", &project.name, "--bin", name]);
         command.arg("--manifest-path").arg(project.directory.join("Cargo.toml")).arg("--").args(arguments);
+        if let Some(checker) = purpose.checker()? {
+            pass_checker(&mut command, &checker);
+        }
         let status = command.status().context("cannot start cargo")?;
         return Ok(status.success());
     }
     let builder = Builder {
         command: "cargo fmu build",
         settings: if purpose == Purpose::Development { FAST.map(str::to_owned).to_vec() } else { Vec::new() },
+        checker: purpose.checker()?,
         ..Builder::new(&project.name, &project.directory)
     };
-    let begin = std::time::SystemTime::now();
     builder.run(options)?;
-    if purpose == Purpose::Release {
-        let directory = options.out.clone().unwrap_or_else(|| project.workspace.join("target/fmu"));
-        crate::compare::warn(&directory, begin);
-    }
     Ok(true)
 }
 

@@ -1,12 +1,12 @@
 //! The program behind `cargo fmu`, which the README of the crate describes.
 //!
-//! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, whose interface types
-//! `compare` compares. `run` simulates an FMU with the inputs that `inputs` reads, for which `motion` compares the interface types, `results` writes the table of results, and `plot`
+//! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, which
+//! `judge` accepts or rejects. `run` simulates an FMU with the inputs that `inputs` reads, for which `motion` compares the interface types, `results` writes the table of results, and `plot`
 //! draws it.
 
 mod builder;
-mod compare;
 mod inputs;
+mod judge;
 mod motion;
 mod new;
 mod plot;
@@ -61,6 +61,9 @@ enum Command {
         #[command(flatten)]
         check: fmu_check::Options,
     },
+    /// Check an FMU that is being built
+    #[command(hide = true)]
+    Judge(judge::Options),
     /// Execute the calls of a finding in a report of `check --out` again; the exit status is 1 if the finding shows
     Replay(fmu_check::ReplayOptions),
 }
@@ -83,6 +86,7 @@ fn carry_out(command: &Command) -> Result<ExitCode> {
         }
         Command::Run(options) => run::run(options),
         Command::Check { package, fmu, input, check } => run::check(package, fmu, input.as_deref(), check),
+        Command::Judge(options) => judge::judge(options),
         Command::Replay(options) => return Ok(fmu_check::replay(options)),
     };
     succeeds.map(|succeeds| if succeeds { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -109,7 +109,7 @@ pub fn check(
         let directory = project.workspace.join("target/fmu");
         let begin = SystemTime::now();
         let build = BuildOptions { out: Some(directory.clone()), ..BuildOptions::default() };
-        if !builder::build(&project, &build, Purpose::Release, &["--out".into(), directory.clone().into()])? {
+        if !builder::build(&project, &build, Purpose::Check, &["--out".into(), directory.clone().into()])? {
             return Ok(false);
         }
         fmus.extend(

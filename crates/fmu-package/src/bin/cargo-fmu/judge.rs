@@ -1,0 +1,134 @@
+//! Accepts or rejects an FMU that is being built, with the same checks as `cargo fmu check --quick`.
+
+use anyhow::Result;
+use fmu_check::{Finding, Progress, Report, Severity, check, compare_interfaces};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Options of the command.
+#[derive(clap::Args)]
+pub struct Options {
+    /// The FMU
+    fmu: PathBuf,
+    /// Seconds that a call of the model may take
+    #[arg(long)]
+    time_limit: u64,
+}
+
+/// The topics of fmu-check, and the rule of another topic, that an FMU must pass.
+const TOPICS: [&str; 7] =
+    ["life_cycle", "start_values", "states", "derivatives", "dependencies", "dynamics", "results.not-finite"];
+
+/// The topics whose findings prove nothing if the results of a model are random.
+const REPEATED: [&str; 2] = ["states", "dynamics"];
+
+/// The beginnings of the names of the rules that a model must not break, and what its author changes if it does. The first that fits
+/// counts. Findings of other rules are warnings.
+const REMEDIES: [(&str, &str); 12] = [
+    (
+        "dynamics.step-derivative",
+        "compare `step` with `by` of the derivative, its `derivative_of`, and the size of the inner steps",
+    ),
+    ("dynamics.set-again", "`calculate` must not change states, parameters or exact outputs"),
+    ("results.not-finite", "the model divides by zero, or takes a root or a logarithm of such a value"),
+    ("derivatives.directional", "compare `by` of the variable with the functions of `Partials`"),
+    ("derivatives.changed", "the functions of `Partials` must not change the model"),
+    ("dependencies.kind", "its equations are not `smooth`"),
+    ("dependencies.", "name it in the `depends_on` of the variable"),
+    ("life_cycle.states-changed", "return `states_changed: true` from `event`"),
+    ("life_cycle.reinit", "add `.reinit()` to its line of variables!, so that importers know that it jumps"),
+    // The messages of the model state the reason.
+    ("life_cycle.simulation", ""),
+    ("life_cycle.rejected", ""),
+    (
+        "states.",
+        "name every field that initialize, a step or an event changes after `memory in` of variables!",
+    ),
+];
+
+/// How a model ends the process, or never returns, which it must not do in any call sequence.
+const ENDS: [&str; 3] = [".crash", ".exit", ".hang"];
+
+/// Time between two lines that show the progress.
+const INTERVAL: Duration = Duration::from_secs(5);
+
+/// Checks an FMU and prints the mistakes; returns whether there are none.
+pub fn judge(options: &Options) -> Result<bool> {
+    let report = checked(options, &TOPICS)?;
+    let (mut mistakes, others): (Vec<_>, Vec<_>) = report.findings.iter().partition(|of| is_mistake(of));
+    mistakes.sort_by_key(|finding| remedy(finding).map(|(rank, _)| rank));
+    if mistakes.iter().any(|finding| REPEATED.contains(&finding.topic()))
+        && checked(options, &["results"])?.findings.iter().any(is_random)
+    {
+        mistakes.retain(|finding| !REPEATED.contains(&finding.topic()));
+        println!("warning: the results of the model are random, so its saved states cannot be compared");
+    }
+    let mut texts = mistakes.iter().map(|finding| text(finding));
+    if let Some(first) = texts.next() {
+        println!("{first}");
+        texts.for_each(|text| println!("error: {text}"));
+        return Ok(false);
+    }
+    for finding in others.iter().filter(|finding| finding.severity > Severity::Note) {
+        println!("warning: {}", text(finding));
+    }
+    for unchecked in report.unreached.iter().filter(|unchecked| !unchecked.allowed) {
+        println!("warning: {} was not checked completely: {}", unchecked.name, unchecked.why);
+    }
+    // A failure of the comparison is not a mistake of the model.
+    if let Ok(Some(difference)) = compare_interfaces(&options.fmu) {
+        let name = options.fmu.file_name().unwrap_or_default().display();
+        println!(
+            "warning: {name}: Co-Simulation and Model Exchange differ: {difference}; cargo fmu check has the calls"
+        );
+    }
+    Ok(true)
+}
+
+/// Checks these topics.
+fn checked(Options { fmu, time_limit }: &Options, topics: &[&str]) -> Result<Report> {
+    let limit = *time_limit as f64;
+    let options = fmu_check::Options {
+        only: topics.iter().map(|topic| (*topic).to_owned()).collect(),
+        quick: true,
+        no_shrink: true,
+        is_build: true,
+        // A call sequence that does not end is repeated with three times the limit.
+        limit: limit / 4.0,
+        time: 2.0 * limit,
+        ..fmu_check::Options::default()
+    };
+    check(fmu, &options, Progress::Every(INTERVAL))
+}
+
+/// Returns whether a finding shows that results are random.
+fn is_random(finding: &Finding) -> bool {
+    ["results.process", "results.instances"].contains(&&*finding.name)
+}
+
+/// Returns whether a finding rejects the build.
+fn is_mistake(finding: &Finding) -> bool {
+    match remedy(finding) {
+        // Values that are not finite are only a note for FMUs of other tools.
+        Some(_) => finding.severity == Severity::Violation || finding.name == "results.not-finite",
+        None => ENDS.iter().any(|end| finding.name.ends_with(end)),
+    }
+}
+
+/// Returns the rank and the text of the remedy.
+fn remedy(finding: &Finding) -> Option<(usize, &'static str)> {
+    let rank = REMEDIES.iter().position(|(rule, _)| finding.name.starts_with(rule))?;
+    Some((rank, REMEDIES[rank].1))
+}
+
+/// Returns the message for a finding.
+fn text(finding: &Finding) -> String {
+    let remedy = match remedy(finding) {
+        _ if finding.name.ends_with(".hang") => {
+            "; if it is only slow, allow more with --time-limit SECONDS".to_owned()
+        }
+        Some((_, remedy)) if !remedy.is_empty() => format!("; {remedy}"),
+        _ => String::new(),
+    };
+    format!("{}{remedy} ({}; cargo fmu check has the calls)", finding.observed, finding.name)
+}

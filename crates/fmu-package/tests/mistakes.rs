@@ -1,0 +1,130 @@
+//! `cargo fmu build` rejects a model that contradicts itself, with a message that names the variable and the remedy.
+//!
+//! The models are compiled once. Each test packs one of them with another mistake, which the model reads from a file in its resources.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Builds a model with a mistake. Returns the output on the standard error if the build rejects the model, or `None` with a check that the
+/// FMU exists.
+fn rejection(model: &str, mistake: &str, fmi: &str) -> Option<String> {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let export = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("fmu-export");
+    let manifest = format!(
+        "[package]\nname = \"{model}\"\nedition = \"2024\"\n[lib]\ncrate-type = [\"cdylib\"]\n[dependencies]\nfmu-export = {{ path = \"{}\"          }}\n[workspace]\n",
+        export.display()
+    );
+    fs::write(path("Cargo.toml"), manifest).unwrap();
+    fs::create_dir_all(path("src")).unwrap();
+    fs::write(path("src/lib.rs"), "").unwrap();
+    fs::create_dir_all(path("modelDescription/resources")).unwrap();
+    fs::write(path("modelDescription/resources/mistake"), mistake).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
+    command.args(["fmu", "build", "--no-page", "--fmi", fmi, "--out", "out", "--binary"]);
+    command.arg(format!("{}={}", platform(fmi), library(model).display())).current_dir(directory.path());
+    let output = command.output().unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    let exists = ["out", "out/fmi3"].iter().any(|out| {
+        fs::read_dir(path(out))
+            .into_iter()
+            .flatten()
+            .flatten()
+            .any(|entry| entry.path().extension().is_some_and(|end| end == "fmu"))
+    });
+    assert_eq!(output.status.success(), exists, "{model} with {mistake:?}: {errors}");
+    (!exists).then_some(errors)
+}
+
+/// Compiles a model, if cargo has not compiled it with this test.
+fn library(model: &str) -> PathBuf {
+    let directory = Path::new(env!("CARGO_BIN_EXE_cargo-fmu")).parent().unwrap();
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--quiet", "--locked", "--manifest-path", manifest, "--example", model]);
+    assert!(cargo.arg("--target-dir").arg(directory.parent().unwrap()).status().unwrap().success());
+    directory.join(format!("examples/lib{model}.so"))
+}
+
+fn platform(fmi: &str) -> &'static str {
+    if fmi == "2" { "linux64" } else { "x86_64-linux" }
+}
+
+/// Asserts that a mistake is rejected with an error that contains these parts.
+fn rejects(model: &str, mistake: &str, fmi: &str, parts: &[&str]) {
+    let errors =
+        rejection(model, mistake, fmi).unwrap_or_else(|| panic!("{model} with {mistake:?} is accepted"));
+    let is_named = parts.iter().all(|part| errors.contains(part));
+    assert!(errors.contains("error: ") && is_named, "{model} with {mistake:?}: {errors}");
+}
+
+fn accepts(model: &str, difference: &str, fmi: &str) {
+    assert_eq!(rejection(model, difference, fmi), None, "{model} with {difference:?}");
+}
+
+#[test]
+fn fields_that_saved_states_lack_are_found() {
+    accepts("memory", "", "2");
+    accepts("memory", "", "3");
+    accepts("memory", "random", "2");
+    for field in ["last", "sum", "shown"] {
+        rejects("memory", field, "2", &["y was ", "after `memory in` of variables!", "states."]);
+    }
+    rejects("memory", "size", "3", &["there is no step size", "after `memory in` of variables!"]);
+    rejects("memory", "ticks", "2", &["n was ", "after `memory in` of variables!"]);
+}
+
+#[test]
+fn states_follow_their_derivatives() {
+    for difference in ["", "at rest", "stiff", "friction", "jumps"] {
+        accepts("cart", difference, "3");
+    }
+    for (mistake, text) in [
+        ("swapped", "x changes by "),
+        ("sign", "v changes by "),
+        ("factor", "v changes by "),
+        ("forgotten", "v changes by "),
+        ("inner steps", "x changes by "),
+        ("still", "v changes by 0.000000e0 per second in a step, but its derivative der(v) is "),
+    ] {
+        rejects("cart", mistake, "2", &[text, "compare `step` with `by` of the derivative"]);
+    }
+}
+
+#[test]
+fn reading_changes_nothing() {
+    for (mistake, name) in [("calculate", "x "), ("clamped", "sets x to "), ("counted", "hits is ")] {
+        rejects("cart", mistake, "2", &[name, "`calculate` must not change states"]);
+    }
+}
+
+#[test]
+fn events_declare_that_they_change_states() {
+    accepts("cart", "jump and reported", "2");
+    rejects("cart", "jump", "3", &[" x was ", "`states_changed: true`"]);
+    rejects("cart", "hit and reported", "2", &[" v was ", "`.reinit()`"]);
+}
+
+#[test]
+fn derivatives_equal_differences_of_the_values() {
+    for fmi in ["2", "3"] {
+        accepts("square", "", fmi);
+        for (mistake, text) in [
+            ("partial", "y with respect to u is "),
+            ("no number", "y with respect to u: "),
+            ("initial_partial", "y in Initialization Mode with respect to u is "),
+        ] {
+            rejects("square", mistake, fmi, &[text, "the functions of `Partials`"]);
+        }
+    }
+    // Time is not a variable of the model, so only FMI 3.0 has derivatives with respect to it.
+    rejects("square", "partial_by_time", "3", &["y with respect to time is ", "the functions of `Partials`"]);
+}
+
+#[test]
+fn values_follow_from_the_variables_that_they_name() {
+    rejects("square", "hidden", "2", &["y ", " v changes", "name it in the `depends_on`"]);
+    rejects("square", "not finite", "3", &["y is not a finite number"]);
+}
