@@ -5,6 +5,7 @@ use std::hash::{Hash as _, Hasher as _};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use zip::CompressionMethod;
 use zip::write::SimpleFileOptions;
 
 /// Returns a file of the directory `models`.
@@ -105,14 +106,15 @@ pub fn pack(
     path
 }
 
-/// Writes a zip file.
+/// Writes a zip file without compression.
 ///
 /// # Panics
 /// Panics if the file cannot be written.
 pub fn zipped<'a>(path: &Path, entries: impl IntoIterator<Item = (&'a str, &'a [u8])>) {
+    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     let mut zip = zip::ZipWriter::new(std::fs::File::create(path).expect("a file"));
     for (name, bytes) in entries {
-        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.start_file(name, stored).expect("an entry");
         zip.write_all(bytes).expect("an entry");
     }
     zip.finish().expect("a zip file");
