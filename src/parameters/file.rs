@@ -29,7 +29,7 @@ pub fn read(file: &Path) -> Result<Parameters, String> {
     named(file, |json| parse(json, &[]).map(|(parameters, _)| parameters))
 }
 
-/// Reads and checks a file that may also contain [`SWITCHES`]. Returns its start values by name.
+/// Reads and checks a file that may also contain the Booleans of `SWITCHES`. Returns its start values by name.
 ///
 /// # Errors
 /// As [`read`].
