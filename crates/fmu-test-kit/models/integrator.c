@@ -37,8 +37,6 @@
      growing_state      reports a larger size of the serialized state with each call
      keeps_y, keeps_bias  values that survive a reset
      derived            calculates the gain from the parameter only once, so that the first gain survives a reset
-     slow               takes 1.5 ms to make an instance
-     unreadable         returns an error if its variable `hidden` is read
      misbehaving        has another output, and the parameter `behaviour` selects how a run ends (BEHAVIOURS)
      unknown, mute      makes no instance; the first one logs why, if logging is on */
 #include "frame.h"
@@ -49,7 +47,7 @@
 
 enum {
     U = 1, Y, GAIN, TOLERANCE, STOP, LABEL, ECHO, COUNTER, WIDE, WIDE_OUT, BINARY, BINARY_OUT, SIZE, VECTOR, SUM, VALVE, NATURAL, SCALE,
-    FACTOR, BIAS, FAILS, HIDDEN, BEHAVIOUR, COUNT, FLAG, INSTANCES, LOGGED
+    FACTOR, BIAS, FAILS, GAP, BEHAVIOUR, COUNT, FLAG, INSTANCES, LOGGED
 };
 /* How a run ends, from 0.5 s on. */
 enum BEHAVIOURS {
@@ -120,7 +118,6 @@ static int begin(Model *m, const char *token, const char *resources) {
         m->file = open(path, O_WRONLY | O_CREAT | O_APPEND, 0600);
         record(m, "+");
     }
-    if (IS(slow)) pause_ms(1.5);
     if (IS(resources)) m->step_size = read_resource(f->fmi == 2, resources, "gain.txt");
     m->offset = m->step_size;
     if (IS(directory) && chdir("/") != 0) abort();
@@ -178,7 +175,7 @@ static bool place(Model *m, Kind kind, uint32_t vr, Place *to) {
     case FACTOR: return at_real(to, &m->factor, FIXED);
     case BIAS: return at_real(to, &m->bias, FIXED);
     case FAILS: return at_real(to, &m->fails, FIXED);
-    case HIDDEN: return !IS(unreadable) && at_real(to, &m->no_value, 0);
+    case GAP: return at_real(to, &m->no_value, 0);
     case BEHAVIOUR: return at(to, INTEGER, &m->behaviour, FIXED);
     case COUNT: return at(to, INTEGER, &m->count, INPUT);
     case FLAG: return at(to, BOOLEAN, &m->flag, INPUT);

@@ -1,12 +1,10 @@
 //! Test FMUs in C: compiles the models in the directory `models`, and packs them with their descriptions.
 
+use fmi_abi::write::zip;
 use std::env::consts::DLL_SUFFIX;
 use std::hash::{Hash as _, Hasher as _};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zip::CompressionMethod;
-use zip::write::SimpleFileOptions;
 
 /// Returns a file of the directory `models`.
 #[must_use]
@@ -99,23 +97,11 @@ pub fn pack(
     files: &[(&str, &[u8])],
 ) -> PathBuf {
     let path = directory.join(format!("{model}.fmu"));
-    let library = std::fs::read(library).expect("the library");
-    let binary = binary(model, fmi);
-    let own = [("modelDescription.xml", description.as_bytes()), (&*binary, &*library)];
-    zipped(&path, own.iter().chain(files).copied());
+    let mut entries = vec![
+        ("modelDescription.xml".to_owned(), description.into()),
+        (binary(model, fmi), std::fs::read(library).expect("the library")),
+    ];
+    entries.extend(files.iter().map(|(name, content)| ((*name).to_owned(), content.to_vec())));
+    std::fs::write(&path, zip(&entries).expect("a zip file")).expect("a file");
     path
-}
-
-/// Writes a zip file without compression.
-///
-/// # Panics
-/// Panics if the file cannot be written.
-pub fn zipped<'a>(path: &Path, entries: impl IntoIterator<Item = (&'a str, &'a [u8])>) {
-    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    let mut zip = zip::ZipWriter::new(std::fs::File::create(path).expect("a file"));
-    for (name, bytes) in entries {
-        zip.start_file(name, stored).expect("an entry");
-        zip.write_all(bytes).expect("an entry");
-    }
-    zip.finish().expect("a zip file");
 }

@@ -13,7 +13,6 @@ const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
     <ScalarVariable name="factor" valueReference="19" causality="parameter" variability="fixed"><Real start="1"/></ScalarVariable>
     <ScalarVariable name="bias" valueReference="20" causality="parameter" variability="fixed"><Real start="0"/></ScalarVariable>
     <ScalarVariable name="fails" valueReference="21" causality="parameter" variability="fixed"><Real start="-1"/></ScalarVariable>
-    <ScalarVariable name="hidden" valueReference="22" variability="discrete"><Real/></ScalarVariable>
   </ModelVariables>
   <ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
 </fmiModelDescription>

@@ -162,7 +162,7 @@ fn runs_are_independent() {
     for seed in 0..60 {
         let random = &mut Random(seed);
         let manner = MANNERS[random.below(MANNERS.len())];
-        let is_reusable = matches!(manner, "good" | "no reset");
+        let is_reusable = matches!(manner, "good" | "no_reset");
         let mut recorded = Recorded::open(manner, "");
         for _ in 0..1 + random.below(11) {
             // A batch of cases with the same number of times.
@@ -220,7 +220,7 @@ fn instances_that_must_not_be_idle_are_freed() {
 
 #[test]
 fn threads_run_an_fmu_at_the_same_time() {
-    for (manner, reuse) in [("good", true), ("state", false), ("no reset", true)] {
+    for (manner, reuse) in [("good", true), ("keeps_y", false), ("no_reset", true)] {
         let recorded = Recorded::open(manner, "");
         std::thread::scope(|scope| {
             for thread in 0..6 {

@@ -2,8 +2,8 @@
 
 use crate::built::built;
 use crate::end;
+use fmi_abi::write::zip;
 use fmu_run::{Error, Fmu, Order, Standard, System};
-use fmu_test_kit::c_models::zipped;
 use std::path::Path;
 
 fn opened(path: &Path) -> Result<System, String> {
@@ -24,9 +24,8 @@ fn messages_say_what_a_file_is() {
         path
     };
     let archive = |name: &str, entries: &[(&str, &str)]| {
-        let path = directory.path().join(name);
-        zipped(&path, entries.iter().map(|(name, text)| (*name, text.as_bytes())));
-        path
+        let entries = entries.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        file(name, &zip(&entries.collect::<Vec<_>>()).unwrap())
     };
     let xml = |version: &str, rest: &str| {
         format!(
@@ -96,10 +95,12 @@ fn unusual_archives_are_read() {
         let library = std::fs::read(unpacked.join(format!("binaries/{platform}/integrator.so"))).unwrap();
         let platform = if standard == Standard::Fmi2 { platform } else { "x86_64-linux-gnu" };
         let strange = directory.path().join("strange.fmu");
-        let binary = format!("binaries\\{platform}\\integrator.so");
-        let entries: [(&str, &[u8]); 3] =
-            [("modelDescription.xml", &latin), (&binary, &library), ("resources\\gain.txt", b"1.5")];
-        zipped(&strange, entries);
+        let entries = [
+            ("modelDescription.xml".to_owned(), latin),
+            (format!("binaries\\{platform}\\integrator.so"), library),
+            ("resources\\gain.txt".to_owned(), b"1.5".to_vec()),
+        ];
+        std::fs::write(&strange, zip(&entries).unwrap()).unwrap();
         let fmu = opened(&strange).unwrap();
         assert_eq!((end(&fmu), fmu.name()), (Ok(2.5), "For\u{eb}ign"));
     }
