@@ -113,9 +113,9 @@ fn compare(run: &Run, steps: &[ShortStep], fmi3: bool, found: &mut [Found]) {
     // Whether the shortest step that can be compared agrees. It decides for very fast states.
     let (mut shortest, mut agreed) = (vec![false; count], vec![0; count]);
     let mut examples = vec![None; count];
-    // Whether the state moves in some steps, and whether it stays in others. Both are true if the solver has internal steps and carries the
-    // remainder of a step to the next one, so its steps cannot be compared.
-    let mut moves = vec![[false; 2]; count];
+    // Whether states move in some steps, and whether all of them stay in others. Both are true if the solver has internal steps and carries
+    // the remainder of a step to the next one, so its steps cannot be compared.
+    let mut moves = [false; 2];
     for ShortStep { size, id, reads } in steps {
         let [before, after] = reads.each_ref().map(|reads| -> Vec<f64> {
             values_of(run, reads).flat_map(|(_, value)| value.numbers()).collect()
@@ -141,7 +141,7 @@ fn compare(run: &Run, steps: &[ShortStep], fmi3: bool, found: &mut [Found]) {
             if !(rounding < 0.1 * TOLERANCE * scale && scale.is_finite()) {
                 continue;
             }
-            moves[number][usize::from(change == 0.0)] = true;
+            moves[usize::from(before[..count] == after[..count])] = true;
             shortest[number] = (change - rate).abs() <= TOLERANCE * scale;
             if shortest[number] {
                 agreed[number] += 1;
@@ -151,7 +151,7 @@ fn compare(run: &Run, steps: &[ShortStep], fmi3: bool, found: &mut [Found]) {
         }
     }
     for (number, found) in found.iter_mut().enumerate() {
-        if agreed[number] > 1 || shortest[number] || moves[number] == [true; 2] {
+        if agreed[number] > 1 || shortest[number] || moves == [true; 2] {
             found.agreed += 1;
         } else if let Some(example) = examples[number] {
             if found.disagreed == 0 {
