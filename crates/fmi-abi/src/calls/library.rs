@@ -17,7 +17,8 @@ impl Library {
     /// Loads a library. Missing functions are replaced by functions that return errors.
     ///
     /// # Safety
-    /// It is sound to load the library, which may run any code, and its functions have the types of the FMI standard.
+    /// It is sound to load the library, which may run any code, and to call its functions as the FMI standard allows. They have the types
+    /// of the standard. Safe code relies on this, because [`client`](crate::client) calls the functions.
     ///
     /// # Errors
     /// Fails if the library cannot be loaded.
@@ -38,7 +39,8 @@ impl Library {
     /// Uses functions that are already in this process.
     ///
     /// # Safety
-    /// The functions belong to an FMU. They stay loaded as long as the returned value exists.
+    /// The functions belong to an FMU, and it is sound to call them as the FMI standard allows. They stay loaded as long as the returned
+    /// value exists.
     pub unsafe fn of(functions: Functions) -> Self {
         Self { functions, loaded: None }
     }
