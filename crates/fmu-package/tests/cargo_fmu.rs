@@ -712,13 +712,13 @@ fn models_that_panic_or_do_not_return_are_rejected() {
         "        let terminate = self.bounce();",
         "        let terminate = self.bounce();\n        assert!(self.height > 0.0);",
     );
-    assert!(error.contains("NewDiscreteStates returns Fatal: ") && error.contains("height > 0.0"), "{error}");
+    assert!(error.contains("DiscreteStates returns Fatal: ") && error.contains("height > 0.0"), "{error}");
     let error = rejects(
         "        let terminate = self.bounce();",
         "        let terminate = self.bounce();\n        while self.height <= 0.0 {}",
     );
     assert!(
-        error.contains("fmi2NewDiscreteStates does not return within ") && error.contains("--time-limit"),
+        error.contains("DiscreteStates does not return within ") && error.contains("--time-limit"),
         "{error}"
     );
     assert!(error.contains("note: ball.fmu: simulates the model"), "{error}");
