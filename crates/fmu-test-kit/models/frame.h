@@ -38,7 +38,7 @@ typedef struct {
 
 /* The part of an instance that any model has. A saved state and a reset leave the members before `time` as they are. */
 typedef struct {
-    int fmi, cs, events, early, logging, asynchronous;
+    int fmi, cs, events, early, visible, logging, asynchronous;
     Callbacks callbacks;
     Logger3 logger3;
     void *environment;
@@ -622,8 +622,10 @@ const char *fmi2GetVersion(void) { return IS(version_wrong) ? "2.1" : "2.0"; }
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 void *fmi2Instantiate(const char *name, int type, const char *token, const char *resources, const Callbacks *callbacks, int visible,
                       int logging) {
-    (void)visible;
-    return callbacks ? make(2, name, token, resources, type == 1, logging, callbacks, NULL, callbacks->environment) : NULL;
+    if (!callbacks) return NULL;
+    Fmu *f = (Fmu *)make(2, name, token, resources, type == 1, logging, callbacks, NULL, callbacks->environment);
+    if (f) f->visible = visible;
+    return f;
 }
 void fmi2FreeInstance(void *c) { release(c); }
 int fmi2SetupExperiment(void *c, int defined, double tolerance, double from, int stops, double stop) {
@@ -666,14 +668,15 @@ ACCESS2(Real, double, REAL) ACCESS2(Integer, int, INTEGER) ACCESS2(Boolean, int,
 const char *fmi3GetVersion(void) { return IS(version_wrong) ? "2.0" : "3.0"; }
 void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *resources, bool visible, bool logging,
                                    void *environment, Logger3 log) {
-    (void)visible;
-    return make(3, name, token, resources, 0, logging, NULL, log, environment);
+    Fmu *f = (Fmu *)make(3, name, token, resources, 0, logging, NULL, log, environment);
+    if (f) f->visible = visible;
+    return f;
 }
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging, bool events,
                                   bool early, const uint32_t *vr, size_t n, void *environment, Logger3 log, void *intermediate) {
     Fmu *f = (Fmu *)make(3, name, token, resources, 1, logging, NULL, log, environment);
-    (void)visible; (void)vr; (void)n; (void)intermediate;
-    if (f) f->early = early, f->events = events;
+    (void)vr; (void)n; (void)intermediate;
+    if (f) f->visible = visible, f->early = early, f->events = events;
     return f;
 }
 void fmi3FreeInstance(void *c) { release(c); }

@@ -99,7 +99,10 @@ static bool place(Model *m, Kind kind, uint32_t vr, Place *to) {
     case X: m->shown = m->x; return calculated(f, to, m->x);
     case V: return calculated(f, to, IS(shared_static) ? shared_v : m->v);
     case DER_X: return calculated(f, to, m->v);
-    case DER_V: return calculated(f, to, slope(m) + (IS(name_in_result) ? 1e-9 * (double)strlen(f->name) : 0));
+    case DER_V: {
+        double added = IS(name_in_result) ? (double)strlen(f->name) : IS(logging_in_result) ? f->logging : IS(visible_in_result) ? f->visible : 0;
+        return calculated(f, to, slope(m) + 1e-9 * added);
+    }
     case Y:
         if (IS(racing_static)) { racing = y; usleep(20); y = racing; }
         if (IS(output_stale)) y = 2 * m->force + m->shown;

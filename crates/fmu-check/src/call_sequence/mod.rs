@@ -116,6 +116,8 @@ pub struct Make {
     pub name: String,
     /// `guid` of FMI 2.0 or `instantiationToken` of FMI 3.0.
     pub token: String,
+    /// Value of `visible`.
+    pub visible: bool,
     /// Value of `loggingOn`.
     pub logging: bool,
     /// Value of `eventModeUsed` (FMI 3.0).

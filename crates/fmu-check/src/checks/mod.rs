@@ -121,7 +121,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Stepped, status::status)),
     ("results", Each(Always, location::location)),
     ("results", Each(Always, results::reading)),
-    ("results", Each(Always, results::name)),
+    ("results", Each(Always, results::arguments)),
     ("results", Each(Stepped3, early_returns::steps)),
     ("results", Each(Several, results::threads)),
     ("results", Each(Several, strings::threads)),

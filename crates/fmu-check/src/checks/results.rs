@@ -1,7 +1,7 @@
-//! Checks that results do not depend on the process, the instance name, other instances, threads, reads or the step size, and that the FMU
+//! Checks that results do not depend on the process, arguments of the instantiation, other instances, threads, reads or the step size, and that the FMU
 //! returns the right times.
 
-use crate::call_sequence::{Arg, Kind, Numbered, Run, Step};
+use crate::call_sequence::{Arg, Kind, Make, Numbered, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Criterion, any, status_name};
@@ -24,20 +24,32 @@ pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     checker.check("results.process", writer.sequence, criterion)
 }
 
-/// Checks that an instance with another name has the same results. Strings are not compared, because they may contain the name.
-pub fn name(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer(trajectory);
-    let mut runs = ["instance", "an instance of another name"].map(|name| {
-        writer.make_with(0, |make| make.name = name.to_owned());
-        let reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
-        writer.free(0);
-        reads
-    });
+/// Rule and message about an argument of the instantiation that must not affect results, and a change of the argument.
+type Argument = (&'static str, &'static str, fn(&mut Make));
+const ARGUMENTS: [Argument; 3] = [
+    ("results.name", "{} is {}, of an instance of another name {}", |make| {
+        make.name = "an instance of another name".to_owned()
+    }),
+    ("results.logging", "{} is {}, of an instance without logging {}", |make| make.logging = false),
+    ("results.visible", "{} is {}, of a visible instance {}", |make| make.visible = true),
+];
+
+/// Checks that an instance with other [`ARGUMENTS`] has the same results. Strings are not compared, because they may contain the name.
+pub fn arguments(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
-    runs.iter_mut().for_each(|reads| reads.retain(|read| read.variables.iter().all(is_number)));
-    let [one, other] = runs;
-    let criterion = checker.differ(&one, &other, "{} is {}, of an instance of another name {}");
-    checker.check("results.name", writer.sequence, criterion)
+    for (rule, message, change) in ARGUMENTS {
+        let mut writer = checker.writer(trajectory);
+        let [usual, changed] = [|_: &mut Make| {}, change].map(|change| {
+            writer.make_with(0, change);
+            let mut reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
+            writer.free(0);
+            reads.retain(|read| read.variables.iter().all(is_number));
+            reads
+        });
+        let criterion = checker.differ(&usual, &changed, message);
+        checker.check(rule, writer.sequence, criterion)?;
+    }
+    Ok(())
 }
 
 /// Checks that two instances that are called in turns have the same results as a single instance.

@@ -8,7 +8,18 @@ use crate::finding::Finding;
 const CAUSES: [(&str, &[&str]); 6] = [
     ("arrays.written-beyond", &["*.crash", "results.", "states.", "reset."]),
     ("results.process", &["results.", "states.", "reset."]),
-    ("results.instances", &["results.threads", "results.reading", "results.name", "states.", "reset."]),
+    (
+        "results.instances",
+        &[
+            "results.threads",
+            "results.reading",
+            "results.name",
+            "results.logging",
+            "results.visible",
+            "states.",
+            "reset.",
+        ],
+    ),
     (
         "results.reading",
         &["states.changed-by-saving", "derivatives.changed", "rejections.changed", "reset.incomplete"],

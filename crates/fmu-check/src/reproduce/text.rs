@@ -96,17 +96,19 @@ impl Printed<'_> {
     fn make(&self, make: &Make) -> String {
         let text = |text: &str| string(Some(text.as_bytes()));
         let (name, token) = (text(&make.name), text(&make.token));
-        let logging = u8::from(make.logging);
+        let (visible, logging) = (u8::from(make.visible), u8::from(make.logging));
         match (self.prefix(), make.co_simulation) {
             ("fmi2", co_simulation) => {
                 let interface = if co_simulation { "fmi2CoSimulation" } else { "fmi2ModelExchange" };
-                format!("fmi2Instantiate({name}, {interface}, {token}, resources, callbacks, 0, {logging})")
+                format!(
+                    "fmi2Instantiate({name}, {interface}, {token}, resources, callbacks, {visible}, {logging})"
+                )
             }
             (_, false) => format!(
-                "fmi3InstantiateModelExchange({name}, {token}, resources, 0, {logging}, environment, logger)"
+                "fmi3InstantiateModelExchange({name}, {token}, resources, {visible}, {logging}, environment, logger)"
             ),
             (_, true) => format!(
-                "fmi3InstantiateCoSimulation({name}, {token}, resources, 0, {logging}, {}, {}, NULL, 0, environment, \
+                "fmi3InstantiateCoSimulation({name}, {token}, resources, {visible}, {logging}, {}, {}, NULL, 0, environment, \
                  logger, NULL)",
                 u8::from(make.event_mode),
                 u8::from(make.early_return)

@@ -128,6 +128,7 @@ impl Executor {
             name: word(&name),
             token: word(&token),
             resources: if has_resources { word(&resources) } else { std::ptr::null() },
+            visible: make.visible.into(),
             logging_on: make.logging.into(),
             callbacks: &raw const *callbacks,
             environment,

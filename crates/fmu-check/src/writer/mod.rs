@@ -106,6 +106,7 @@ impl<'a> Writer<'a> {
             co_simulation: stepped,
             name: "instance".to_owned(),
             token: self.description.token.clone(),
+            visible: false,
             logging: true,
             event_mode: stepped && self.description.event_mode(),
             early_return: false,

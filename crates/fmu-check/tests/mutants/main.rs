@@ -142,6 +142,8 @@ mutants! {
     3 early_time_wrong "results" "results.early-return";
     3 early_unreported "results" "results.early-unreported";
     2 name_in_result "results" "results.name";
+    3 logging_in_result "results" "results.logging";
+    2 visible_in_result "results" "results.visible";
     3 reference_once "results" "results.repeated";
     3 start_time_ignored "results" "results.time";
     2 step_overshoots "results" "results.time";
