@@ -8,8 +8,8 @@
 //! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
 //! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `schema`,
-//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`, `activity`, `schedule`,
-//! `baseline`, `report`, `replay`.
+//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`,
+//! `activity`, `schedule`, `baseline`, `report`, `replay`.
 
 mod activity;
 mod always;

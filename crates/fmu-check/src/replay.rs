@@ -169,8 +169,8 @@ fn with_token(sequence: &[Numbered], reported: &str, token: &str) -> CallSequenc
     sequence
 }
 
-/// Checks that each function is one of the FMI version and gets the number of its arguments, that the directory of the FMU stays in the temporary
-/// directory, and that copies do not fill the memory, because someone else may have written the report.
+/// Checks that each function is one of the FMI version and gets the number of its arguments, that the directory of the FMU stays in the
+/// temporary directory, and that copies do not fill the memory, because someone else may have written the report.
 fn check_calls(sequence: &[Numbered], standard: Standard) -> anyhow::Result<()> {
     if length(sequence) > MOST_STEPS {
         bail!("the finding has more than {MOST_STEPS} calls");

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 /// A model that can be exported as an FMU.
 ///
 /// A model consists of a [table](crate::variables) that defines a struct with the values of its inputs, parameters and
-/// states, or maps variables to the fields of another struct, and of equations. This crate provides the C interface, checks the order of calls and
-/// the values, and takes care of the log and of saved states. So a model needs no `unsafe` and no value references.
+/// states, or maps variables to the fields of another struct, and of equations. This crate provides the C interface, checks the order of
+/// calls and the values, and takes care of the log and of saved states. So a model needs no `unsafe` and no value references.
 ///
 /// A model implements capabilities and names them in [`export_fmu!`](crate::export_fmu):
 /// [`CoSimulation`](crate::CoSimulation), [`ModelExchange`](crate::ModelExchange),

@@ -58,8 +58,8 @@ pub struct Builder {
     pub terminals: Vec<Terminal>,
     /// Settings of cargo for this build, such as `profile.release.lto=false`.
     pub settings: Vec<String>,
-    /// Start values that replace the start values of the compiled model: the variable's name and the value, for example `0.5`, `true`, or the
-    /// number of an item. They are written into the compiled library, so the library need not be compiled again.
+    /// Start values that replace the start values of the compiled model: the variable's name and the value, for example `0.5`, `true`, or
+    /// the number of an item. They are written into the compiled library, so the library need not be compiled again.
     pub start: Vec<(String, String)>,
     /// Label in messages for a build with other parameter values than the default ones. `None` for the default values, whose
     /// description is kept with the sources.
@@ -133,8 +133,8 @@ impl Builder {
         }
         let content_without_page: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
         if let Some(checker) = &self.checker {
-            // Both versions have the same model, so one is checked: FMI 3.0, whose description states more dependencies. If there are arrays,
-            // both are, because FMI 2.0 has their elements as variables.
+            // Both versions have the same model, so one is checked: FMI 3.0, whose description states more dependencies. If there are
+            // arrays, both are, because FMI 2.0 has their elements as variables.
             let unchecked = if model.table.arrays { 0 } else { descriptions.len() - 1 };
             for (fmi, description) in &descriptions[unchecked..] {
                 let parts = Parts {

@@ -44,8 +44,8 @@ impl Library {
         Ok(path)
     }
 
-    /// Reads a library, also from an FMU that contains it, and checks that it is for this platform (with `any_processor`, only for its operating system) and was compiled
-    /// with fmu-export.
+    /// Reads a library, also from an FMU that contains it, and checks that it is for this platform (with `any_processor`, only for its
+    /// operating system) and was compiled with fmu-export.
     ///
     /// # Errors
     /// When the file cannot be read or is another kind of file; the message contains the path.

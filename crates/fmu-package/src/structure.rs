@@ -202,8 +202,8 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     Ok(Unknown { dependencies, ..found })
 }
 
-/// Returns the unknowns with the dependencies that the evaluations of a smooth model find: from the partial derivatives if the model provides them and
-/// is running, else from changes of the values.
+/// Returns the unknowns with the dependencies that the evaluations of a smooth model find: from the partial derivatives if the model
+/// provides them and is running, else from changes of the values.
 fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let table = &sampler.model.table;
     let unknown = |index: &u32| Unknown { index: *index, dependencies: Vec::new() };

@@ -119,8 +119,8 @@ pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: u
     }
 }
 
-/// Returns the values of each known, and the state vector, in the middle of a simulation with these parameters. A list of values is empty if they cannot
-/// be read.
+/// Returns the values of each known, and the state vector, in the middle of a simulation with these parameters. A list of values is empty
+/// if they cannot be read.
 pub fn middle_values(
     checker: &Checker,
     trajectory: &Trajectory,

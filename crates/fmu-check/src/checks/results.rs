@@ -1,5 +1,5 @@
-//! Checks that results do not depend on the process, arguments of the instantiation, other instances, threads, reads or the step size, and that the FMU
-//! returns the right times.
+//! Checks that results do not depend on the process, arguments of the instantiation, other instances, threads, reads or the step size, and
+//! that the FMU returns the right times.
 
 use crate::call_sequence::{Arg, Kind, Make, Numbered, Run, Step};
 use crate::checker::Checker;

@@ -177,8 +177,8 @@ impl CheckedStructure<'_> {
     }
 }
 
-/// Fails if a system cannot set the start value of this variable, or if the string is not a valid value: a number in the range, a Boolean, a
-/// string, or an item of the enumeration.
+/// Fails if a system cannot set the start value of this variable, or if the string is not a valid value: a number in the range, a Boolean,
+/// a string, or an item of the enumeration.
 fn check_start(found: Found, name: &str, text: &str) -> Result<(), Error> {
     found.check_start(name)?;
     let Attributes { min, max, base, .. } = &**found.variable;

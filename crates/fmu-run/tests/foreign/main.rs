@@ -1,5 +1,5 @@
-//! FMUs that behave like FMUs of other producers. `integrator.c` of the test kit describes each manner and, for most of them, names tools in which it
-//! was observed.
+//! FMUs that behave like FMUs of other producers. `integrator.c` of the test kit describes each manner and, for most of them, names tools
+//! in which it was observed.
 #![allow(unsafe_code, reason = "FMUs are opened")]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
