@@ -1,20 +1,10 @@
 //! A model whose states do not follow their derivatives, or change unexpectedly.
 #![allow(missing_docs, unsafe_code)]
 
+mod mistake;
+
 use fmu_export::*;
-use std::sync::OnceLock;
-
-/// The name of the mistake, which is in the resources of the FMU.
-static MISTAKE: OnceLock<String> = OnceLock::new();
-
-fn mistake() -> &'static str {
-    MISTAKE.get().map_or("", String::as_str)
-}
-
-fn read_mistake(setup: &Setup) {
-    let path = setup.resources().map(|directory| directory.join("mistake"));
-    MISTAKE.get_or_init(|| path.and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default());
-}
+use mistake::{mistake, read_mistake};
 
 /// A cart on a spring, x' = v, v' = (u - k x - d v) / m. [`mistake`] selects a mistake or another difference.
 #[derive(Clone)]

@@ -1,20 +1,10 @@
 //! A model whose saved states lack one of the fields that it remembers.
 #![allow(missing_docs, unsafe_code)]
 
+mod mistake;
+
 use fmu_export::*;
-use std::sync::OnceLock;
-
-/// The name of the mistake, which is in the resources of the FMU.
-static MISTAKE: OnceLock<String> = OnceLock::new();
-
-fn mistake() -> &'static str {
-    MISTAKE.get().map_or("", String::as_str)
-}
-
-fn read_mistake(setup: &Setup) {
-    let path = setup.resources().map(|directory| directory.join("mistake"));
-    MISTAKE.get_or_init(|| path.and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default());
-}
+use mistake::{mistake, read_mistake};
 
 /// A field that is missing in saved states if the mistake has its name.
 #[derive(Clone)]
