@@ -9,6 +9,7 @@ use super::{integrate, locked, measure};
 use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step, step_name};
 use fmi_abi::c_types::c_void;
 use std::collections::HashMap;
+use std::sync::Barrier;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -48,9 +49,14 @@ impl Executor {
                 Step::Parallel(sequences) => {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     THREADS.store(true, Ordering::Relaxed);
+                    // On a busy machine, a thread could otherwise end before the next one begins.
+                    let begin = Barrier::new(sequences.len());
                     std::thread::scope(|scope| {
                         for sequence in sequences {
-                            scope.spawn(|| self.execute(sequence, report));
+                            scope.spawn(|| {
+                                begin.wait();
+                                self.execute(sequence, report);
+                            });
                         }
                     });
                     THREADS.store(false, Ordering::Relaxed);
