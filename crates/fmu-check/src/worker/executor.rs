@@ -16,13 +16,26 @@ use std::ffi::CString;
 use std::fs::File;
 use std::io::Write as _;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 /// Whether call sequences are being executed on several threads.
 pub static THREADS: AtomicBool = AtomicBool::new(false);
 
 /// Identifier of the process that executes the call sequence.
 pub static PROCESS: AtomicU32 = AtomicU32::new(0);
+
+/// Number of calls that have returned strings on several threads.
+static STRING_CALLS: AtomicUsize = AtomicUsize::new(0);
+
+/// Waits until another thread has called a function that returns strings, at most 2 ms. So other threads can overwrite the strings before
+/// this thread copies them, in case the FMU has one buffer for all instances.
+fn wait_for_another_thread() {
+    let (own, begin) = (STRING_CALLS.fetch_add(1, Ordering::Relaxed) + 1, Instant::now());
+    while STRING_CALLS.load(Ordering::Relaxed) == own && begin.elapsed() < Duration::from_millis(2) {
+        std::thread::sleep(Duration::from_micros(20));
+    }
+}
 
 /// Instance of the FMU; `environment` is the environment pointer that was passed to its instantiation.
 pub struct Instance {
@@ -195,9 +208,7 @@ impl Executor {
         outcome.status = Some(status);
         let is_string = |array: &PassedArray| matches!(array.content, Content::Output(Kind::Pointer, _));
         if THREADS.load(Ordering::Relaxed) && arrays.iter().any(is_string) {
-            // Gives other threads time to overwrite the strings before this thread copies them, in case the FMU has one buffer
-            // for all instances.
-            std::thread::sleep(std::time::Duration::from_micros(20));
+            wait_for_another_thread();
         }
         let succeeded = status == 0 || status == 1;
         for PassedArray { array, content } in &arrays {
