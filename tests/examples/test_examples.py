@@ -191,7 +191,7 @@ def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> Non
 
 def test_a_little_learning_beats_every_lqr() -> None:
     limits = importlib.import_module("learned_limits")
-    figure, away = limits.main(count=512, rounds=12, fresh=200)
+    figure, away = limits.main(count=512, rounds=24, fresh=200)
     assert away["learned"].mean() < 0.97 * away["best LQR"].mean()
     assert len(figure.axes) == 3
 

@@ -125,8 +125,8 @@ def _make_unique(element: Any, name: str, used: set[str]) -> None:
 
 
 def _shorter(numbers: str) -> str:
-    """Rounds numbers to two decimals, a hundredth of a point, and removes spaces."""
-    text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), numbers)
+    """Rounds numbers to a tenth of a point, which is less than a pixel of the page, and removes spaces."""
+    text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.1f}".rstrip("0").rstrip("."), numbers)
     text = re.sub(r"-0(?![.\d])", "0", re.sub(r"\s+", " ", text))
     return re.sub(r" ?([A-Za-z]) (?=-?\d)", r"\1", text).strip()
 
@@ -146,8 +146,9 @@ def _restyle(element: Any) -> None:
             rules["font-weight"] = "bold"
     if element.tag == f"{SVG}text":
         rules.pop("fill", None)
-    if rules.get("font-size") == TICK_SIZE:
-        del rules["font-size"]
+    for key, value in (("font-size", TICK_SIZE), ("text-anchor", "start"), ("stroke-dashoffset", "0")):
+        if rules.get(key) == value:  # inherited, or the default of SVG
+            del rules[key]
     for key in ("fill", "stroke"):
         if key in rules:
             rules[key] = COLOURS.get(rules[key].lower(), rules[key])
@@ -200,7 +201,7 @@ def _relative(points: str) -> str:
         return points
     text, drawn, before = "", "", ("0", "0")
     for command, *point in found:
-        numbers = point if command == "M" else [f"{float(b) - float(a):.2f}" for a, b in zip(before, point)]
+        numbers = point if command == "M" else [f"{float(b) - float(a):.1f}" for a, b in zip(before, point)]
         text += f"{'M' if command == 'M' else 'l' if drawn == 'M' else ' '}{' '.join(numbers)}"
         drawn, before = command, (point[0], point[1])
     return _shorter(text)
