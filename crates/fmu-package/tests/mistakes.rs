@@ -1,6 +1,7 @@
 //! `cargo fmu build` rejects a model that contradicts itself, with a message that names the variable and the remedy.
 //!
-//! The models are compiled once. Each test packs one of them with another mistake, which the model reads from a file in its resources.
+//! Each model contains all of its mistakes, and a file in the resources of the FMU selects one of them. So a model is compiled only once,
+//! although each mistake is packed in an FMU of its own.
 #![cfg(target_os = "linux")]
 
 use std::fs;

@@ -1,7 +1,7 @@
-//! Calls any FMU (FMI 2.0 and 3.0) with any arguments, also with wrong ones. [`client`](crate::client) is the safe way to call an FMU.
+//! Calls any FMU (FMI 2.0 and 3.0) with any arguments. To use an FMU, call it through [`client`](crate::client), which is safe.
 //!
-//! A program that tests an FMU must also make the calls that a safe client prevents, so nothing here is checked: pointers may be NULL or
-//! wrong, and the order of the calls is arbitrary. [`Library`] loads an FMU, and [`Functions`] contains its functions.
+//! This module is for programs that test FMUs. They must also make the calls that a safe client prevents, for example with a NULL pointer
+//! or in a forbidden order, so nothing is checked here. [`Library`] loads an FMU, and [`Functions`] contains its functions.
 //! [`Functions::instantiate`] takes the arguments of all instantiation functions as one [`Instantiation`]. The other functions are called
 //! as fields of the structures in [`Functions`], or by name with [`Functions::call`], for which [`signatures`] lists the types of the
 //! arguments. Log messages go to a [`LogReceiver`].

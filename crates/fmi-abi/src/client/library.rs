@@ -13,7 +13,7 @@ use std::path::Path;
 /// load the library and to call them.
 ///
 /// # Errors
-/// Fails if the library cannot be loaded, or lacks the function that frees instances.
+/// Fails if the library cannot be loaded, or if it has no function that frees instances, because then each instance would leak.
 pub unsafe fn load(path: &Path, standard: Standard) -> Result<Library, LoadError> {
     provide_symbols();
     // SAFETY: the caller guarantees that loading is sound, and that the functions have the types of the FMI standard.

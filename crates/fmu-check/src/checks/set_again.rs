@@ -8,8 +8,9 @@ use crate::writer::Part::{Begin, Points};
 use crate::writer::{Trajectory, Writer, value_of};
 use fmi_abi::{Causality, Initial};
 
-/// Checks that a variable which only a step or an event may change keeps its value when the same time or the same inputs are set again, and
-/// that a state that was set in Model Exchange is read back.
+/// Checks that setting the same time or the same inputs again changes neither states nor parameters nor exact outputs, because an importer
+/// may repeat such calls. In Model Exchange, also checks that the FMU returns the states that the importer has set: a solver integrates
+/// from the states that it set, not from others.
 pub fn set_again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let states = description.states();
