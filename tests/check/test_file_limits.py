@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from built import ROOT, built
+from file_limits import run_limited
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and names of POSIX")
 
@@ -17,18 +18,7 @@ CHECK = [os.fsencode(ROOT / "target" / "debug" / "cargo-fmu"), b"fmu", b"check",
 @pytest.mark.parametrize("limit", [0, 10_000, 300_000])
 def test_an_fmu_that_cannot_be_unpacked(tmp_path: Path, limit: int) -> None:
     """The message is one line, and no report and no part of the FMU remains."""
-    resource = pytest.importorskip("resource", reason="POSIX has limits on the size of files")
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    done = subprocess.run(
-        [*CHECK, built("prw_testbed.fmu", "fmu"), b"--out", b"report"],
-        cwd=tmp_path,
-        env={**os.environ, "TMPDIR": str(temporary)},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    done = run_limited([*CHECK, built("prw_testbed.fmu", "fmu"), b"--out", b"report"], tmp_path, limit)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
     assert "cannot be unpacked" in done.stderr and "File too large" in done.stderr
     assert [path.name for path in tmp_path.rglob("*")] == ["temporary"]

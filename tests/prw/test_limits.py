@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from file_limits import run_limited
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits, signals and names of POSIX")
 
@@ -49,22 +50,13 @@ def test_only_two_short_modules_precede_the_handling_of_interrupts() -> None:
 )
 def test_files_that_exceed_the_limit(tmp_path: Path, fmu: Path, limit: int, message: str) -> None:
     """The message is one line, and neither the directory for results nor the one for temporary files has a part of a file."""
-    resource = pytest.importorskip("resource", reason="POSIX has limits on the size of files")
-    recording, temporary = tmp_path / "motors.csv", tmp_path / "temporary"
+    recording = tmp_path / "motors.csv"
     recording.write_text(RECORDING)
-    temporary.mkdir()
-    done = subprocess.run(
-        [sys.executable, "-m", "prw", "simulate", str(recording), "--fmu", str(fmu), "--out", "out"],
-        cwd=tmp_path,
-        env={**os.environ, "TMPDIR": str(temporary)},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    command = [sys.executable, "-m", "prw", "simulate", str(recording), "--fmu", str(fmu), "--out", "out"]
+    done = run_limited(command, tmp_path, limit)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
     assert message in done.stderr and "File too large" in done.stderr
-    assert not list(tmp_path.glob("out/*")) and not list(temporary.iterdir())
+    assert not list(tmp_path.glob("out/*")) and not list(tmp_path.glob("temporary/*"))
 
 
 def test_names_that_are_not_utf8(tmp_path: Path, fmu: Path) -> None:
