@@ -453,8 +453,10 @@ fn variables(
         .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
     let mut remaining = MAX_VALUES;
     let indexed = nodes.iter().enumerate().rev();
-    let by_reference: HashMap<u32, usize> =
-        indexed.filter_map(|(index, node)| Some((number(*node, "valueReference")?, index))).collect();
+    // The index of each variable, and its start value, which is a size if it is a structural parameter.
+    let by_reference: HashMap<u32, (usize, Option<usize>)> = indexed
+        .filter_map(|(index, node)| Some((number(*node, "valueReference")?, (index, number(*node, "start")))))
+        .collect();
     let mut found = Vec::new();
     for node in &nodes {
         let Some(reference) = number(*node, "valueReference") else {
@@ -480,14 +482,15 @@ fn variables(
         let base = base_of(standard, of_type.tag_name().name());
         // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
         let size = |dimension: Node| {
-            let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
-            let configured = || structure.get(&number(dimension, "valueReference")?).copied();
-            number(dimension, "start").or_else(configured).or_else(|| number(parameter()?, "start"))
+            number(dimension, "start").or_else(|| {
+                let parameter = number(dimension, "valueReference")?;
+                structure.get(&parameter).copied().or_else(|| by_reference.get(&parameter)?.1)
+            })
         };
         let dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).map(size);
         let derivative_of = number(of_type, "derivative").and_then(|of| match standard {
             Standard::Fmi2 => from_one(of).filter(|index| *index < nodes.len()),
-            Standard::Fmi3 => by_reference.get(&of).copied(),
+            Standard::Fmi3 => by_reference.get(&of).map(|(index, _)| *index),
         });
         let mut variable = variable(*node, of_type, declared, (standard, base), dimensions.collect());
         (variable.reference, variable.derivative_of) = (reference, derivative_of);
@@ -500,25 +503,30 @@ fn variables(
     Ok(found)
 }
 
-/// A declared type. Variables of this type share its attributes.
-struct Declared<'a> {
-    node: Node<'a, 'a>,
-    /// In FMI 2.0, the child element that has the attributes (section 2.2.3).
-    inner: Option<Node<'a, 'a>>,
+/// Attributes of a declared type, which are read once for all variables of this type.
+struct Declared {
     unit: Option<Arc<str>>,
     display_unit: Option<Arc<str>>,
+    min: Option<f64>,
+    max: Option<f64>,
+    nominal: Option<f64>,
+    is_relative: Option<bool>,
 }
 
-impl<'a> Declared<'a> {
-    fn read(node: Node<'a, 'a>) -> Self {
+impl Declared {
+    /// In FMI 2.0, a child element has the attributes (section 2.2.3).
+    fn read(node: Node) -> Self {
         let inner = node.first_element_child();
-        let shared =
-            |name| Self { node, inner, unit: None, display_unit: None }.attribute(name).map(Arc::from);
-        Self { node, inner, unit: shared("unit"), display_unit: shared("displayUnit") }
-    }
-
-    fn attribute(&self, name: &str) -> Option<&'a str> {
-        self.node.attribute(name).or_else(|| self.inner?.attribute(name))
+        let attribute = |name| node.attribute(name).or_else(|| inner?.attribute(name));
+        let number = |name| attribute(name)?.trim().parse().ok();
+        Self {
+            unit: attribute("unit").map(Arc::from),
+            display_unit: attribute("displayUnit").map(Arc::from),
+            min: number("min"),
+            max: number("max"),
+            nominal: number("nominal"),
+            is_relative: attribute("relativeQuantity").and_then(boolean),
+        }
     }
 }
 
@@ -530,11 +538,17 @@ fn variable(
     (standard, base): (Standard, Option<BaseType>),
     dimensions: Option<Vec<usize>>,
 ) -> Variable {
-    let of_both = |name: &str| of_type.attribute(name).or_else(|| declared?.attribute(name));
     let shared = |name: &str, of_declared: fn(&Declared) -> Option<Arc<str>>| {
         of_type.attribute(name).map(Arc::from).or_else(|| of_declared(declared?))
     };
-    let limit = |name| of_both(name).and_then(|value| value.trim().parse().ok());
+    let limit = |name: &str, of_declared: fn(&Declared) -> Option<f64>| match of_type.attribute(name) {
+        Some(value) => value.trim().parse().ok(),
+        None => declared.and_then(of_declared),
+    };
+    let is_relative = match of_type.attribute("relativeQuantity") {
+        Some(value) => boolean(value),
+        None => declared.and_then(|of| of.is_relative),
+    };
     let causality = node.attribute("causality").and_then(Causality::of_name).unwrap_or(Causality::Local);
     let variability = node.attribute("variability");
     let has_variability = variability.is_some();
@@ -559,12 +573,12 @@ fn variable(
         dimensions,
         size,
         is_too_large: false,
-        min: limit("min"),
-        max: limit("max"),
-        nominal: limit("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
+        min: limit("min", |of| of.min),
+        max: limit("max", |of| of.max),
+        nominal: limit("nominal", |of| of.nominal).filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
         unit: shared("unit", |of| of.unit.clone()),
         display_unit: shared("displayUnit", |of| of.display_unit.clone()),
-        is_relative: of_both("relativeQuantity").and_then(boolean) == Some(true),
+        is_relative: is_relative == Some(true),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
         reinit: matches!(of_type.attribute("reinit"), Some("true" | "1")),

@@ -11,7 +11,7 @@ use std::sync::Arc;
 const MAX_ELEMENTS: usize = 1 << 20;
 /// Maximum memory of the elements of all arrays, in bytes.
 const MAX_BYTES: usize = 256 << 20;
-/// Estimated memory of an element without its name, in bytes.
+/// Estimated memory of an element without its name and indices, in bytes.
 const ELEMENT: usize = 160;
 
 /// The arrays of an FMU. Each element has a number that serves as its value reference. These numbers are larger than all value
@@ -123,7 +123,9 @@ impl Arrays {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
-        let bytes = self.bytes.checked_add(length.checked_mul(ELEMENT + 2 * name.len())?)?;
+        // The name of an element has an index for each dimension.
+        let indices: usize = array.sizes.iter().map(|size| size.to_string().len() + 1).sum();
+        let bytes = self.bytes.checked_add(length.checked_mul(ELEMENT + 2 * (name.len() + indices))?)?;
         if self.elements.len() + length > MAX_ELEMENTS || bytes > MAX_BYTES {
             return None;
         }

@@ -1,5 +1,7 @@
 //! Conversions of values on their way from an output to an input.
 
+use std::sync::Arc;
+
 /// A conversion: between units, or a transformation of SSP (section 4.5.2 of SSP 1.0). The default changes nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Change(Vec<Step>);
@@ -8,8 +10,9 @@ pub(crate) struct Change(Vec<Step>);
 enum Step {
     /// factor * value + offset.
     Linear(f64, f64),
-    /// Pairs of a value and the value that replaces it; all other values stay.
-    Map(Vec<(f64, f64)>),
+    /// Pairs of a value and the value that replaces it; all other values stay. If `is_inverse`, the values of each pair are swapped.
+    /// Many connections may share the pairs.
+    Map { pairs: Arc<[(f64, f64)]>, is_inverse: bool },
 }
 
 impl Change {
@@ -24,7 +27,7 @@ impl Change {
 
     /// Returns the change that replaces values: each pair is a value and its replacement.
     pub fn map(pairs: Vec<(f64, f64)>) -> Self {
-        Self(vec![Step::Map(pairs)])
+        Self(vec![Step::Map { pairs: pairs.into(), is_inverse: false }])
     }
 
     /// Returns this change followed by another one.
@@ -45,7 +48,9 @@ impl Change {
     pub fn inverse(&self) -> Self {
         let inverse = |step: &Step| match step {
             Step::Linear(factor, offset) => Step::Linear(1.0 / factor, -offset / factor),
-            Step::Map(pairs) => Step::Map(pairs.iter().map(|(from, to)| (*to, *from)).collect()),
+            Step::Map { pairs, is_inverse } => {
+                Step::Map { pairs: Arc::clone(pairs), is_inverse: !is_inverse }
+            }
         };
         Self(self.0.iter().rev().map(inverse).collect())
     }
@@ -56,7 +61,7 @@ impl Change {
 
     /// Returns how often the change replaces single values.
     pub fn maps(&self) -> usize {
-        self.0.iter().filter(|step| matches!(step, Step::Map(_))).count()
+        self.0.iter().filter(|step| matches!(step, Step::Map { .. })).count()
     }
 
     /// Returns whether the change calculates with values, which must be Real.
@@ -67,7 +72,12 @@ impl Change {
     pub fn apply(&self, value: f64) -> f64 {
         self.0.iter().fold(value, |value, step| match step {
             Step::Linear(factor, offset) => factor * value + offset,
-            Step::Map(pairs) => pairs.iter().find(|(from, _)| *from == value).map_or(value, |(_, to)| *to),
+            Step::Map { pairs, is_inverse: false } => {
+                pairs.iter().find(|(from, _)| *from == value).map_or(value, |(_, to)| *to)
+            }
+            Step::Map { pairs, is_inverse: true } => {
+                pairs.iter().find(|(_, to)| *to == value).map_or(value, |(from, _)| *from)
+            }
         })
     }
 }

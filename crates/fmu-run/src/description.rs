@@ -7,6 +7,7 @@ use crate::unit::Unit;
 use fmi_abi::client::VariableNames;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
+use std::collections::HashMap;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -20,8 +21,8 @@ pub struct Variable {
     pub reference: u32,
     /// Start value as written in the model description, if there is one.
     pub start: Option<Arc<str>>,
-    /// Name of the continuous state or input whose time derivative this variable is, if there is one.
-    pub derivative_of: Option<String>,
+    /// Index, among the variables of the FMU, of the continuous state or input whose time derivative this variable is, if there is one.
+    pub derivative_of: Option<usize>,
     /// Further attributes, shared by the elements of an array.
     attributes: Arc<Attributes>,
 }
@@ -107,6 +108,8 @@ pub struct Description {
     /// Arrays, whose elements are variables.
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
+    /// Definitions of the units by name, so that each text is read once and not for each variable.
+    definitions: HashMap<String, Unit>,
     /// For each variable of the file, the range of its entries in `variables`: one entry, or one for each element of an array. The
     /// range is empty for a clock, a clocked variable, or an array whose size is unknown or too large.
     spans: Vec<Range<usize>>,
@@ -189,6 +192,11 @@ impl Description {
             states,
             event_indicators,
             arrays: Arc::new(arrays),
+            definitions: written
+                .units
+                .iter()
+                .filter_map(|(name, of)| Some((name.clone(), Unit::of(of)?)))
+                .collect(),
             indices: Index::of(variables.iter().map(|of| of.name.as_str())),
             variables,
             spans,
@@ -229,7 +237,10 @@ impl Description {
     /// continuous states.
     pub(crate) fn is_known(&self, name: &str) -> bool {
         self.variable(name).is_some_and(Variable::is_settable)
-            || self.variables.iter().any(|of| of.derivative_of.as_deref() == Some(name))
+            || self
+                .variables
+                .iter()
+                .any(|of| of.derivative_of.is_some_and(|of| self.variables[of].name == name))
     }
 
     /// Returns the names and numbers of the items of a variable's enumeration, if it has one.
@@ -296,8 +307,8 @@ impl Description {
 
     /// Returns the definition of the unit of a variable, if there is one.
     pub(crate) fn unit_of(&self, variable: &Variable) -> Option<Unit> {
-        let unit = Unit::of(self.units.get(variable.unit.as_deref()?)?)?;
-        Some(if variable.is_relative { unit.of_difference() } else { unit })
+        let unit = self.definitions.get(variable.unit.as_deref()?)?;
+        Some(if variable.is_relative { unit.of_difference() } else { *unit })
     }
 }
 
@@ -437,7 +448,7 @@ fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [V
     for (own, of) in spans.iter().zip(&written.variables) {
         let Some(state) = of.derivative_of else { continue };
         for (own, state) in own.clone().zip(spans[state].clone()) {
-            variables[own].derivative_of = Some(variables[state].name.clone());
+            variables[own].derivative_of = Some(state);
         }
     }
 }

@@ -82,6 +82,15 @@ fn of_arrays(arrays: usize, letters: usize, elements: usize) -> String {
     description("3.0", "", &repeated(arrays, array), "")
 }
 
+/// Returns a description with `count` derivatives of a variable whose name has `letters` letters.
+fn of_derivatives(letters: usize, count: usize) -> String {
+    let variable = |name: &str, k: usize, derivative: &str| {
+        format!("<ScalarVariable name=\"{name}\" valueReference=\"{k}\"><Real{derivative}/></ScalarVariable>")
+    };
+    let each = repeated(count, |k| variable(&format!("d{k}"), k + 1, " derivative=\"1\""));
+    description("2.0", "", &(variable(&"x".repeat(letters), 0, "") + &each), "")
+}
+
 /// Returns a description in which outputs depend on arrays.
 fn of_dependencies(outputs: usize, dependencies: usize, elements: usize) -> String {
     let array =
@@ -109,6 +118,13 @@ fn memory_grows_with_the_file() {
     for (outputs, dependencies, elements) in [(1000, 10, 1000), (10, 10_000, 1000), (1000, 1, 10_000)] {
         let name = format!("{outputs} outputs that depend {dependencies} times on {elements} elements");
         families.push((name, of_dependencies(outputs, dependencies, elements), 400 * elements));
+    }
+    for (letters, count) in [(100_000, 1000), (1000, 10_000)] {
+        families.push((
+            format!("{count} derivatives of {letters} letters"),
+            of_derivatives(letters, count),
+            0,
+        ));
     }
     for (name, text, more) in families {
         let before = USED.load(Ordering::Relaxed);

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use signals::Signals;
 use start::Start;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 create_exception!(
@@ -209,7 +209,12 @@ impl Loaded {
             fmu_run::Standard::Fmi3 => "3.0",
         };
         let derivatives = about.elements(&about.derivatives);
-        let derivatives = derivatives.filter_map(|of| Some((of.derivative_of.clone()?, of.name.clone())));
+        // Each state once, because its name may be long, and several derivatives may be declared for it.
+        let mut states = HashSet::new();
+        let derivatives = derivatives.filter_map(|of| {
+            let state = of.derivative_of.filter(|state| states.insert(*state))?;
+            Some((about.variables[state].name.clone(), of.name.clone()))
+        });
         let outputs = about.elements(&about.outputs).filter(|of| of.base.is_float());
         let offers = [("co-simulation", &about.co_simulation), ("model-exchange", &about.model_exchange)];
         let offers =

@@ -103,8 +103,7 @@ impl<'a> ModelExchangePlan<'a> {
                 && !batch.inputs.iter().any(|(name, _)| *name == of.name)
                 && !batch.start.iter().any(|(name, _)| *name == of.name)
         });
-        let declared: Vec<_> =
-            declared.filter_map(|of| Some((of.name.clone(), of.derivative_of.clone()?))).collect();
+        let declared: Vec<_> = declared.filter_map(|of| Some((of.name.clone(), of.derivative_of?))).collect();
         let known = |other: &str, moving: &Selection| moving.names().iter().position(|name| name == other);
         for (name, other, variables) in rates {
             let Some(index) = known(other, &self.moving) else {
@@ -116,7 +115,7 @@ impl<'a> ModelExchangePlan<'a> {
             self.moving.push(name, &variables);
         }
         for (name, other) in declared {
-            if let Some(index) = known(&other, &self.moving) {
+            if let Some(index) = known(&self.description.variables[other].name, &self.moving) {
                 self.sources.push(Source::RateOf(index));
                 self.moving.push(&name, &system.find(&name)?);
             }

@@ -82,8 +82,7 @@ fn jacobian_of(description: &Description) -> Option<(Vec<u32>, Vec<u32>)> {
     description.offer(Interface::ModelExchange).filter(|offer| offer.directional_derivatives)?;
     let derivatives = description.elements(&description.derivatives);
     let pairs = derivatives.map(|derivative| {
-        let state = description.variable(derivative.derivative_of.as_ref()?)?;
-        Some((derivative.reference, state.reference))
+        Some((derivative.reference, description.variables[derivative.derivative_of?].reference))
     });
     pairs.collect::<Option<Vec<_>>>().map(|pairs| pairs.into_iter().unzip())
 }

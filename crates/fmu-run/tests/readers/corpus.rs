@@ -74,6 +74,7 @@ pub fn descriptions() -> Files {
         ("dependencies of each element", fmi3(&arrays(2, "causality=\"output\""), "<Output valueReference=\"1\" dependencies=\"2 2 2 2\"/><Output valueReference=\"2\" dependencies=\"1 1 1\"/>")),
         ("dimensions that overflow", fmi3("<Float64 name=\"a\" valueReference=\"1\"><Dimension start=\"18446744073709551615\"/><Dimension start=\"18446744073709551615\"/></Float64>", "<EventIndicator valueReference=\"1\"/>")),
         ("sizes that overflow", fmi3(&arrays(4, "").replace("100000", "9223372036854775807"), &"<EventIndicator valueReference=\"1\"/><EventIndicator valueReference=\"2\"/><EventIndicator valueReference=\"3\"/>".repeat(2))),
+        ("many dimensions", fmi3(&arrays(1, "").replace("<D", &("<Dimension start=\"1\"/>".repeat(10_000) + "<D")), "")),
         ("states", fmi3(&arrays(1, "derivative=\"1\""), &states(2000))),
         ("event indicators", description(2, "numberOfEventIndicators=\"18446744073709551615\"", "<ModelExchange modelIdentifier=\"m\"/>", "")),
         ("event indicators of arrays", fmi3(&arrays(1, ""), &"<EventIndicator valueReference=\"1\"/>".repeat(100))),
@@ -138,6 +139,41 @@ pub fn chain(count: usize, closes: bool) -> Vec<u8> {
     closed(system(&components, ""), &(0..end).map(connect).collect::<String>())
 }
 
+/// Returns a system in which the value of an input is transformed, with `pairs` pairs, and then passed to `count` inner inputs.
+fn fan(kind: &str, pairs: usize, count: usize) -> Vec<u8> {
+    let connector = |name: &str| {
+        format!("<ssd:Connector name=\"{name}\" kind=\"input\"><ssc:Enumeration name=\"E\"/></ssd:Connector>")
+    };
+    let each = |text: &dyn Fn(usize) -> String, count| (0..count).map(text).collect::<String>();
+    let items = each(&|number| format!("<ssc:Item name=\"{number}\" value=\"{number}\"/>"), pairs);
+    let entries = each(&|number| format!("<ssc:MapEntry source=\"{number}\" target=\"{number}\"/>"), pairs);
+    let inner = each(&|number| connector(&format!("u{number}")), count);
+    let links = each(
+        &|number| {
+            format!("<ssd:Connection startConnector=\"x\" endElement=\"j\" endConnector=\"u{number}\"/>")
+        },
+        count,
+    );
+    let of_system = |name: &str, connectors: &str, elements: &str, connections: &str| {
+        format!(
+            "<ssd:System name=\"{name}\"><ssd:Connectors>{connectors}</ssd:Connectors><ssd:Elements>{elements}</ssd:Elements>\
+            <ssd:Connections>{connections}</ssd:Connections></ssd:System>"
+        )
+    };
+    let i = of_system("i", &connector("x"), &of_system("j", &inner, "", ""), &links);
+    let transformed = format!(
+        "<ssd:Connection startConnector=\"x\" endElement=\"i\" endConnector=\"x\"><ssc:{kind}MappingTransformation>{entries}\
+        </ssc:{kind}MappingTransformation></ssd:Connection>"
+    );
+    let root = of_system("s", &connector("x"), &(component("c", "m") + &i), &transformed);
+    format!(
+        "<ssd:SystemStructureDescription xmlns:ssd=\"http://ssp-standard.org/SSP1/SystemStructureDescription\" \
+        xmlns:ssc=\"http://ssp-standard.org/SSP1/SystemStructureCommon\" version=\"1.0\" name=\"S\">{root}<ssd:Enumerations>\
+        <ssc:Enumeration name=\"E\">{items}</ssc:Enumeration></ssd:Enumerations></ssd:SystemStructureDescription>"
+    )
+    .into_bytes()
+}
+
 /// Returns a system with connections between connectors that do not exist.
 pub fn unrelated(count: usize) -> Vec<u8> {
     let connect = |number: usize| connection(("", &format!("a{number}")), ("", &format!("a{}", number + 1)));
@@ -194,6 +230,31 @@ pub fn systems() -> Files {
         ("no system", b"<a/>".to_vec()),
         ("empty", Vec::new()),
     ]
+}
+
+/// Returns a model description and systems in which the same text, transformation or mapping has many uses, so that reading it again
+/// for each use would take minutes or gigabytes.
+pub fn uses() -> [Files; 2] {
+    let zeros = "0".repeat(1_000_000);
+    let of_texts: String = (2..60_000)
+        .map(|number| format!("<Float64 name=\"a{number}\" valueReference=\"{number}\" declaredType=\"T\"><Dimension valueReference=\"1\"/></Float64>"))
+        .collect();
+    let of_texts = format!(
+        "<TypeDefinitions><Float64Type name=\"T\" min=\"{zeros}\"/></TypeDefinitions><ModelVariables>\
+        <UInt64 name=\"n\" valueReference=\"1\" causality=\"structuralParameter\" start=\"{zeros}\"/>{of_texts}</ModelVariables>"
+    );
+    let parameter = "<ssd:Parameter name=\"q\"><ssd:Real value=\"1\"/></ssd:Parameter>".repeat(30_000);
+    let mapping = "<ssd:MappingEntry source=\"q\" target=\"c\"/>".repeat(30_000);
+    let mapped = format!(
+        "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssd:ParameterSet><ssd:Parameters>{parameter}</ssd:Parameters>\
+        </ssd:ParameterSet></ssd:ParameterValues><ssd:ParameterMapping>{mapping}</ssd:ParameterMapping></ssd:ParameterBinding></ssd:ParameterBindings>"
+    );
+    let systems = vec![
+        ("mappings of each parameter", closed(system(&component("c", "m"), &mapped), "")),
+        ("transformation before a fan", fan("Integer", 20_000, 5000)),
+        ("names of an enumeration", fan("Enumeration", 60_000, 1)),
+    ];
+    [vec![("long numbers of a type and of a size", description(3, "", CS, &of_texts))], systems]
 }
 
 /// Returns parameter sets (SSV).

@@ -134,6 +134,20 @@ fn malformed_files_are_errors_whatever_memory_there_is() {
     }
 }
 
+#[test]
+#[ignore = "started under a limit of memory"]
+fn read_uses() {
+    let system = directory().join("system");
+    let [descriptions, systems] = corpus::uses();
+    each("description", &descriptions, harness::description);
+    each("system", &systems, |bytes| harness::file_of_system(&system, "SystemStructure.ssd", bytes));
+}
+
+#[test]
+fn parts_with_many_uses_are_read_once() {
+    run_limited("read_uses", 512, 0);
+}
+
 /// Mutates a file one to four times: changes bytes, repeats or removes parts, and inserts tokens that may confuse a parser.
 fn mutated(random: &mut Random, original: &[u8]) -> Vec<u8> {
     const TOKENS: [&str; 16] = [

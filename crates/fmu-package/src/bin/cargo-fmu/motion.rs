@@ -9,6 +9,7 @@ use fmu_run::{
     BaseType, Batch, Description, Fmu, Integration, Interface, Occurrence, Runs, Start, Trajectory, Value,
     Variable, Watch,
 };
+use std::collections::HashSet;
 use std::fmt;
 
 /// A motion: communication points, inputs and start values.
@@ -117,16 +118,14 @@ pub fn compare(fmu: &Fmu, motion: &Motion) -> Result<Option<Comparison>> {
 /// Returns the variables that are compared: outputs and states.
 fn compared(description: &Description) -> Vec<&Variable> {
     let variables = &description.variables;
-    let is_state = |name: &str| {
-        variables
-            .iter()
-            .any(|of| of.causality != Causality::Input && of.derivative_of.as_deref() == Some(name))
-    };
-    let is_compared = |of: &&Variable| {
+    let derivatives = variables.iter().filter(|of| of.causality != Causality::Input);
+    let states: HashSet<usize> = derivatives.filter_map(|of| of.derivative_of).collect();
+    let is_compared = |(index, of): &(usize, &Variable)| {
         !is_exact(of)
-            && (of.causality == Causality::Output || of.causality == Causality::Local && is_state(&of.name))
+            && (of.causality == Causality::Output
+                || of.causality == Causality::Local && states.contains(index))
     };
-    variables.iter().filter(is_compared).collect()
+    variables.iter().enumerate().filter(is_compared).map(|(_, of)| of).collect()
 }
 
 /// Returns the inputs as Co-Simulation holds them, with a jump at each communication point.

@@ -83,6 +83,10 @@ impl<'t> Target<'t> {
         all: &mut Vec<(String, Value)>,
     ) -> Result<(), Error> {
         let Self { read, definition, routes, next } = self;
+        let mapped = entry.map_or(0, |entry| {
+            size_of::<Entry>() + entry.transformation.as_ref().map_or(0, |of| of.comparisons(1))
+        });
+        read.take(mapped).map_err(|why| read.fail(&why))?;
         let is_overwritten =
             || routes.get(name).is_some_and(|route| definition.look_up(route.origin).is_some());
         let ends = match (definition.look_up(name), read.connectors.get(name)) {

@@ -12,9 +12,10 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Maximum memory of names and parameters, in bytes. Names of nested systems are repeated for each element, and several elements may
-/// refer to the same parameter file, so a small file may need much memory.
-const MAX_BYTES: usize = 128 << 20;
+/// Maximum memory of names and parameters, in bytes, and number of comparisons. Names of nested systems are repeated for each element,
+/// several elements may refer to the same parameter file, and each parameter may have many mappings, so a small file may need much
+/// memory or time.
+const MOST: usize = 128 << 20;
 
 /// Content of `SystemStructure.ssd`.
 pub(super) struct Read<'r> {
@@ -31,7 +32,7 @@ pub(super) struct Read<'r> {
     pub units: Units,
     /// Items of enumerations by name.
     pub enumerations: HashMap<String, Vec<(String, String)>>,
-    /// Number of bytes that may still be read.
+    /// Number of bytes that may still be read, or comparisons that may still be made.
     remaining: Cell<usize>,
 }
 
@@ -97,7 +98,7 @@ impl<'r> Read<'r> {
             bindings: Vec::new(),
             units: units(root),
             enumerations: enumerations.collect(),
-            remaining: Cell::new(MAX_BYTES),
+            remaining: Cell::new(MOST),
         }
     }
 
@@ -106,10 +107,11 @@ impl<'r> Read<'r> {
         Error::Fmu(format!("{}: {why}", self.path.display()))
     }
 
-    /// Subtracts from the number of bytes that may still be read. Fails if too few remain.
-    pub fn take(&self, bytes: usize) -> Result<(), String> {
-        let remaining = self.remaining.get().checked_sub(bytes);
-        self.remaining.set(remaining.ok_or("the names and parameters of its elements take too much memory")?);
+    /// Subtracts bytes or comparisons from the number that remains. Fails if too few remain.
+    pub fn take(&self, count: usize) -> Result<(), String> {
+        let remaining = self.remaining.get().checked_sub(count);
+        let why = "the names, parameters and mappings of its elements take too much memory or time";
+        self.remaining.set(remaining.ok_or(why)?);
         Ok(())
     }
 
@@ -236,6 +238,14 @@ impl Transformation {
                 "a connection or mapping has the transformation {}, which is unknown",
                 shown(other)
             )),
+        }
+    }
+
+    /// Returns an upper bound for the number of comparisons in [`change`](Self::change) with this number of items.
+    pub fn comparisons(&self, items: usize) -> usize {
+        match self {
+            Self::Change(_) => 0,
+            Self::Names(pairs) => pairs.len().saturating_mul(items),
         }
     }
 

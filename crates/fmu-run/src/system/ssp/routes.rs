@@ -184,6 +184,8 @@ impl Read<'_> {
         let items = |name| self.items(definition, name);
         let ends = [items(link.from), items(link.to)];
         let [from, to] = [ends[0].or(ends[1]), ends[1].or(ends[0])].map(Option::unwrap_or_default);
+        let comparisons = transformation.comparisons(from.len() + to.len());
+        self.take(comparisons).map_err(|why| self.fail(&why))?;
         Ok((change.then(&transformation.change(from, to).map_err(fail)?), unit_at_end))
     }
 
