@@ -3,6 +3,7 @@
 
 use crate::capabilities::Step;
 use crate::model::Error;
+use std::convert::Infallible;
 
 /// Maximum number of parts of a step.
 const MOST_PARTS: f64 = 1e7;
@@ -45,13 +46,32 @@ pub fn rk4<const N: usize>(
     step: Step,
     mut rates: impl FnMut(f64, [f64; N]) -> [f64; N],
 ) -> [f64; N] {
+    let Ok(end) = runge_kutta(&state, step, |time, state| Ok::<_, Infallible>(rates(time, state)));
+    end
+}
+
+/// The method of [`rk4`] for any number of states, and for rates that may fail.
+pub(crate) fn runge_kutta<S: Clone + AsRef<[f64]> + AsMut<[f64]>, E>(
+    state: &S,
+    step: Step,
+    mut rates: impl FnMut(f64, S) -> Result<S, E>,
+) -> Result<S, E> {
     let size = step.size;
-    let after = |size: f64, rates: [f64; N]| std::array::from_fn(|n| state[n] + size * rates[n]);
-    let first = rates(step.time, state);
-    let second = rates(step.time + 0.5 * size, after(0.5 * size, first));
-    let third = rates(step.time + 0.5 * size, after(0.5 * size, second));
-    let fourth = rates(step.end(), after(size, third));
-    after(size, std::array::from_fn(|n| (first[n] + 2.0 * (second[n] + third[n]) + fourth[n]) / 6.0))
+    let after = |size: f64, rates: &S| {
+        let mut after = state.clone();
+        after.as_mut().iter_mut().zip(rates.as_ref()).for_each(|(state, rate)| *state += size * rate);
+        after
+    };
+    let first = rates(step.time, state.clone())?;
+    let second = rates(step.time + 0.5 * size, after(0.5 * size, &first))?;
+    let third = rates(step.time + 0.5 * size, after(0.5 * size, &second))?;
+    let fourth = rates(step.end(), after(size, &third))?;
+    let mut mean = first;
+    let others = second.as_ref().iter().zip(third.as_ref()).zip(fourth.as_ref());
+    for (first, ((second, third), fourth)) in mean.as_mut().iter_mut().zip(others) {
+        *first = (*first + 2.0 * (second + third) + fourth) / 6.0;
+    }
+    Ok(after(size, &mean))
 }
 
 /// Direction in which an event indicator changes its sign.
@@ -154,7 +174,7 @@ fn is_after(falls: bool, value: f64) -> bool {
 
 /// Returns the part of a step up to a change of sign. `begin` and `end` are the values of the indicator at both ends
 /// of the step.
-fn locate(
+pub(crate) fn locate(
     step: Step,
     [begin, end]: [f64; 2],
     falls: bool,

@@ -7,11 +7,12 @@ use crate::table::Variables;
 use crate::variable::Variable;
 use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 
-/// Simulates a model in this process, for the tests of the model. It makes the calls that a Co-Simulation importer
-/// makes.
+/// Simulates a model in this process, for the tests of the model. It makes the calls that an importer makes, either of
+/// Co-Simulation or of Model Exchange.
 ///
 /// As in an FMU, every value is checked, and events are handled within a step. Messages are stored; see
-/// [`messages`](Self::messages).
+/// [`messages`](Self::messages). Model Exchange is integrated with a tolerance of 1e-10, so the results of both
+/// interface types differ only by the errors of the model's `step`, unless its equations or events contradict `step`:
 ///
 /// ```
 /// # use fmu_export::*;
@@ -21,7 +22,9 @@ use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 /// #     /// Input
 /// #     u = input(&NUMBER) in u;
 /// #     /// Output
-/// #     x = output(&NUMBER).exact() in x;
+/// #     x = output(&NUMBER).state() in x;
+/// #     /// Its rate
+/// #     der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |lag| lag.u - lag.x;
 /// # }
 /// # impl Model for Lag {
 /// #     const INFO: Info = Info::new("Lag", "lag");
@@ -33,9 +36,12 @@ use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 /// #         Ok(Stepped::Done)
 /// #     }
 /// # }
-/// # offer!(Lag: CoSimulation);
-/// let x = Simulation::<Lag>::new()?.set("u", 1.0)?.run(5.0)?.get("x")?;
-/// assert!((x - (1.0 - (-5.0_f64).exp())).abs() < 1e-12);
+/// # impl ModelExchange for Lag {}
+/// # offer!(Lag: CoSimulation + ModelExchange);
+/// for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+///     let x = Simulation::<Lag>::of(interface)?.set("u", 1.0)?.run(5.0)?.get("x")?;
+///     assert!((x - (1.0 - (-5.0_f64).exp())).abs() < 1e-9);
+/// }
 /// # Ok::<(), Error>(())
 /// ```
 pub struct Simulation<M> {
@@ -44,13 +50,21 @@ pub struct Simulation<M> {
 }
 
 impl<M: Exported> Simulation<M> {
-    /// Creates a simulation of the model with its start values. The step size comes from the default experiment of
-    /// [`INFO`](crate::Model::INFO).
+    /// Creates a simulation in Co-Simulation with the start values of the model. The step size comes from the default
+    /// experiment of [`INFO`](crate::Model::INFO).
     ///
     /// # Errors
     /// Fails if the model cannot be created, or does not support Co-Simulation.
     pub fn new() -> Result<Self, Error> {
-        Self::with(Setup::new(Interface::CoSimulation))
+        Self::of(Interface::CoSimulation)
+    }
+
+    /// Creates a simulation of this interface type, as [`new`](Self::new) does for Co-Simulation.
+    ///
+    /// # Errors
+    /// Fails if the model cannot be created, or does not support the interface type.
+    pub fn of(interface: Interface) -> Result<Self, Error> {
+        Self::with(Setup::new(interface))
     }
 
     /// Creates a simulation of a model that reads files. `directory` contains the files, for example
@@ -63,13 +77,17 @@ impl<M: Exported> Simulation<M> {
         Self::with(Setup { resource_location, ..Setup::new(Interface::CoSimulation) })
     }
 
-    fn with(setup: Setup) -> Result<Self, Error> {
+    /// Creates a simulation with this setup, for example of Model Exchange with resources.
+    ///
+    /// # Errors
+    /// Same errors as [`of`](Self::of).
+    pub fn with(setup: Setup) -> Result<Self, Error> {
         let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: true };
         let instance = Instance::new(setup, importer, true)?;
         Ok(Self { instance, step_size: M::INFO.default_experiment.step_size })
     }
 
-    /// Sets the size of the following steps, s.
+    /// Sets the size of the following steps, s. In Model Exchange, steps of the integration may be shorter.
     pub fn step_size(&mut self, size: f64) -> &mut Self {
         self.step_size = size;
         self
@@ -137,6 +155,9 @@ impl<M: Exported> Simulation<M> {
         if self.instance.mode() == Mode::Instantiated {
             self.instance.enter_initialization_mode_at(Experiment::default())?;
             self.instance.exit_initialization_mode()?;
+            if self.instance.mode() == Mode::Event {
+                self.instance.handle_event()?;
+            }
             self.instance.listen();
         }
         Ok(self)
@@ -148,6 +169,11 @@ impl<M: Exported> Simulation<M> {
     /// Fails if the model rejects a step.
     pub fn run(&mut self, until: f64) -> Result<&mut Self, Error> {
         self.initialize()?;
+        if self.instance.interface() == Interface::ModelExchange {
+            self.instance.integrate(until, self.step_size)?;
+            self.instance.listen();
+            return Ok(self);
+        }
         let begin = self.time();
         let steps = ((until - begin) / self.step_size - 1e-9).ceil();
         for step in 1..=steps as u64 {

@@ -1,7 +1,7 @@
 //! Co-Simulation (section 4.2 of both FMI versions).
 
 use super::{Importer, Instance, Outcome, Rejection, discard, reject, reject_with};
-use crate::capabilities::{Events, Step, Stepped};
+use crate::capabilities::{Event, Events, Step, Stepped};
 use crate::export::Exported;
 use crate::model::Error;
 use fmi_abi::Mode;
@@ -20,10 +20,10 @@ pub(crate) struct Reached {
 
 /// Maximum number of events per step, and of iterations per event. A model that needs more is taken to be in an
 /// endless loop.
-const MOST_EVENTS: u32 = 10_000;
+pub(super) const MOST_EVENTS: u32 = 10_000;
 
 /// Advice in the message about too many events.
-const CHATTER: &str = "make shorter steps, or give the events hysteresis if the model chatters";
+pub(super) const CHATTER: &str = "make shorter steps, or give the events hysteresis if the model chatters";
 
 impl<M: Exported> Instance<M> {
     /// Whether steps may end early. It is a constant, so that models whose steps never end early have no overhead.
@@ -227,7 +227,7 @@ impl<M: Exported> Instance<M> {
                 discard(format!("it has more than {MOST_EVENTS} events; {CHATTER}"))
             };
             events += 1;
-            let next = handled.and_then(|()| match () {
+            let next = handled.and_then(|_| match () {
                 () if self.state.ended => Ok(Stepped::Terminate(time)),
                 () if time == end => Ok(Stepped::Done),
                 () => Ok(self.exported_step(time, end - time)?),
@@ -251,23 +251,23 @@ impl<M: Exported> Instance<M> {
         self.go_back(Err(Box::new(why)))
     }
 
-    /// Performs the event iteration in Co-Simulation for an importer that does not handle events.
-    pub(super) fn handle_event(&mut self) -> Outcome {
+    /// Performs the event iteration for an importer that does not handle events, and returns the last result.
+    pub fn handle_event(&mut self) -> Outcome<Event> {
         let time = self.state.time;
-        let ended = self.try_change(|model| {
+        let (event, ended) = self.try_change(|model| {
             let mut ended = false;
             for _ in 0..MOST_EVENTS {
                 model.calculate(time);
                 let event = model.exported_event(time)?;
                 ended |= event.terminate;
                 if !event.again {
-                    return Ok(ended);
+                    return Ok((event, ended));
                 }
             }
             reject(format!("the event at {time} does not come to an end in {MOST_EVENTS} rounds"))
         })?;
         self.state.ended |= ended;
-        Ok(())
+        Ok(event)
     }
 
     #[cold]

@@ -7,6 +7,7 @@
 mod co_simulation;
 mod derivatives;
 mod handles;
+mod integration;
 mod model_exchange;
 mod origin;
 mod reference;

@@ -118,18 +118,21 @@ impl<M: Exported> Instance<M> {
             let number = if count == 0 { "no".to_owned() } else { count.to_string() };
             return reject(format!("there are {number} event indicators, not {}", indicators.len()));
         }
-        if count == 0 {
-            return Ok(());
-        }
-        let mut now = vec![0.0; count];
-        self.calculated().exported_indicators(&mut now);
-        if let Some(index) = now.iter().position(|indicator| !indicator.is_finite()) {
-            return reject(format!("event indicator {index} is not a finite number"));
-        }
-        indicators.iter_mut().zip(now).for_each(|(indicator, now)| {
+        indicators.iter_mut().zip(self.indicators()?).for_each(|(indicator, now)| {
             indicator.write(now);
         });
         Ok(())
+    }
+
+    pub fn indicators(&mut self) -> Outcome<Vec<f64>> {
+        let mut now = vec![0.0; Self::INDICATORS];
+        if Self::INDICATORS > 0 {
+            self.calculated().exported_indicators(&mut now);
+        }
+        if let Some(index) = now.iter().position(|indicator| !indicator.is_finite()) {
+            return reject(format!("event indicator {index} is not a finite number"));
+        }
+        Ok(now)
     }
 }
 

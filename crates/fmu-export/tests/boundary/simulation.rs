@@ -1,7 +1,7 @@
 //! Tests of [`Simulation`], with which authors test their models without an FMU.
 
 use crate::models::{Rod, Ticker};
-use fmu_export::{Simulation, Value};
+use fmu_export::{Interface, Simulation, Value};
 
 /// Checks a scalar variable, elements of arrays and whole arrays, all by their names in the model description.
 #[test]
@@ -38,13 +38,79 @@ fn errors_name_the_mistake() {
 /// Checks that events within a step are handled, and that the simulation ends when the model requests it.
 #[test]
 fn events_are_handled() {
-    let mut ticker = Simulation::<Ticker>::new().unwrap();
-    ticker.set("amount", 2.0).unwrap().set("last", 4).unwrap().step_size(0.6).run(0.6).unwrap();
-    assert_eq!((ticker.get("ticks").unwrap(), ticker.get("sum").unwrap()), (3.0, 6.0));
-    assert!(!ticker.has_ended() && ticker.time() == 0.6);
-    ticker.run(9.0).unwrap();
-    assert!(ticker.has_ended() && ticker.time() == 0.75);
-    assert_eq!(ticker.get("ticks").unwrap(), 4.0);
+    for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+        let mut ticker = Simulation::<Ticker>::of(interface).unwrap();
+        ticker.set("amount", 2.0).unwrap().set("last", 4).unwrap().step_size(0.6).run(0.6).unwrap();
+        assert_eq!((ticker.get("ticks").unwrap(), ticker.get("sum").unwrap()), (3.0, 6.0));
+        assert!(!ticker.has_ended() && ticker.time() == 0.6);
+        ticker.run(9.0).unwrap();
+        assert!(ticker.has_ended() && ticker.time() == 0.75);
+        assert_eq!(ticker.get("ticks").unwrap(), 4.0);
+    }
+}
+
+mod slope {
+    use fmu_export::*;
+
+    variables! {
+        /// x' = gain / (1 - x), which has no solution after x = 1, and a switch that holds x at 0.
+        pub struct Slope;
+
+        /// Slope
+        gain: f64 = parameter(&NUMBER).start(1.0);
+        /// Whether the switch holds x
+        holds: bool = parameter(&BOOLEAN);
+        /// State
+        x: f64 = output(&NUMBER).state();
+        /// Whether x rises
+        rises: bool = output(&BOOLEAN).exact().start(true);
+        /// Its rate
+        der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |slope| match (slope.holds, slope.rises) {
+            (false, _) => slope.gain / (1.0 - slope.x),
+            (true, rises) => if rises { slope.gain } else { -slope.gain },
+        };
+    }
+
+    impl Model for Slope {
+        const INFO: Info = info!("Slope", "slope");
+    }
+
+    impl ModelExchange for Slope {
+        const INDICATORS: usize = 1;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators[0] = if self.holds { self.x - 0.25 } else { 1.0 };
+        }
+
+        fn event(&mut self, _: f64) -> Result<Event, Error> {
+            self.rises = self.x <= 0.25;
+            Ok(Event::default())
+        }
+    }
+
+    offer!(Slope: ModelExchange);
+}
+
+/// Checks the integration of a nonlinear model, whose solution is 1 - sqrt(1 - 2 t), and that the simulation fails where no step has a
+/// small error, or where the model switches back and forth.
+#[test]
+fn model_exchange_is_integrated() {
+    let simulation = || Simulation::<slope::Slope>::of(Interface::ModelExchange).unwrap();
+    for size in [1e-3, 0.1, 10.0] {
+        let x = simulation().step_size(size).run(0.375).unwrap().get("x").unwrap();
+        assert!((x - 0.5).abs() < 1e-9, "{x} with steps of {size} s");
+    }
+    let rejected =
+        |result: Result<&mut Simulation<slope::Slope>, fmu_export::Error>| result.err().unwrap().to_string();
+    let steep = rejected(simulation().run(1.0));
+    assert!(
+        steep.starts_with("the derivatives at 0.49999") && steep.ends_with("s are too steep for any step"),
+        "{steep}"
+    );
+    let chatters = rejected(simulation().set("holds", true).unwrap().run(1.0));
+    assert!(chatters.contains("more than 10000 events") && chatters.contains("hysteresis"), "{chatters}");
+    let missing = Simulation::<slope::Slope>::new().err().unwrap();
+    assert_eq!(missing.to_string(), "this FMU has no Co-Simulation");
 }
 
 /// Checks that another simulation can continue from a saved state. The state must include the `memory` fields of the

@@ -9,8 +9,9 @@ use fmu_export::*;
 fn it_bounces_when_it_should() {
     let fall = (2.0_f64 / 9.81).sqrt();
     let expected = fall + 2.0 * fall * (0.7 + 0.7_f64.powi(2) + 0.7_f64.powi(3) + 0.7_f64.powi(4));
-    for size in [1e-3, 0.05, 10.0] {
-        let mut ball = Simulation::<Ball>::new().unwrap();
+    let exchange = (Interface::ModelExchange, 0.05);
+    for (interface, size) in [1e-3, 0.05, 10.0].map(|size| (Interface::CoSimulation, size)).into_iter().chain([exchange]) {
+        let mut ball = Simulation::<Ball>::of(interface).unwrap();
         ball.step_size(size).run(10.0).unwrap();
         let time = ball.time();
         assert!((time - expected).abs() < 1e-9, "{time} instead of {expected} with steps of {size} s");

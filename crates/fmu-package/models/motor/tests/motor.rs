@@ -4,7 +4,11 @@ use fmu_export::*;
 use motor::Motor;
 
 fn speed(duty: f64, step_size: f64, time: f64) -> f64 {
-    let mut motor = Simulation::<Motor>::new().unwrap();
+    speed_in(Interface::CoSimulation, duty, step_size, time)
+}
+
+fn speed_in(interface: Interface, duty: f64, step_size: f64, time: f64) -> f64 {
+    let mut motor = Simulation::<Motor>::of(interface).unwrap();
     motor.step_size(step_size).set("duty", duty).unwrap().run(time).unwrap().get("speed").unwrap()
 }
 
@@ -19,6 +23,14 @@ fn always_on_it_follows_the_exact_solution() {
     let exact = u / k * (1.0 + (s2 * (s1 * t).exp() - s1 * (s2 * t).exp()) / (s1 - s2));
     let speed = speed(1.0, 1e-3, t);
     assert!((speed - exact).abs() < 1e-3, "{speed} instead of {exact}");
+}
+
+/// With pulses, too, `step` follows the derivatives and events that importers of Model Exchange integrate.
+#[test]
+fn both_interface_types_agree() {
+    let [stepped, integrated] = [Interface::CoSimulation, Interface::ModelExchange]
+        .map(|interface| speed_in(interface, 0.25, 1e-3, 0.0207));
+    assert!((stepped - integrated).abs() < 1e-4 * integrated, "{stepped} and {integrated}");
 }
 
 /// Without load, the mean voltage determines the speed, at any step size.

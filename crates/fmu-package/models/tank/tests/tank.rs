@@ -28,6 +28,19 @@ fn the_bucket_is_emptied_once() {
     assert!((tank.get("level").unwrap() - 1.2).abs() < 1e-12);
 }
 
+/// `step` and the equations are separate code, so the results must be equal except for the errors of `step`.
+#[test]
+fn both_interface_types_agree() {
+    let [stepped, integrated] = [Interface::CoSimulation, Interface::ModelExchange].map(|interface| {
+        let mut tank = Simulation::<Tank>::of(interface).unwrap();
+        tank.run(100.0).unwrap().set("bucket", true).unwrap().run(600.0).unwrap();
+        ["level", "switches", "duration"].map(|name| tank.get(name).unwrap())
+    });
+    for (stepped, integrated) in stepped.into_iter().zip(integrated) {
+        assert!((stepped - integrated).abs() < 1e-5, "{stepped} and {integrated}");
+    }
+}
+
 #[test]
 fn points_that_do_not_rise_are_rejected() {
     let mut tank = Simulation::<Tank>::new().unwrap();
