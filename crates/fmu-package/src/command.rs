@@ -2,7 +2,7 @@
 
 use crate::c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools, compiled_files};
 use crate::cargo::LibraryBuild;
-use crate::checker::{check, passed_checker};
+use crate::checker::{Check, passed_checker};
 use crate::connectors::{Terminal, terminals};
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::describe::{Changes, describe};
@@ -147,8 +147,9 @@ impl Builder {
                     content: &content_without_page,
                 };
                 let fmu = directory.path().join(format!("{}.fmu", model.identifier()));
-                pack(&fmu, &parts)?;
-                check(checker, &fmu, time_limit)?;
+                let Packed { guid, .. } = pack(&fmu, &parts)?;
+                let record = target.join(format!(".{}-fmi{}-checked", model.identifier(), *fmi as u32 + 2));
+                Check { checker, fmu: &fmu, guid: &guid, limit: time_limit, record: &record }.run()?;
             }
         }
         if versions.contains(&Standard::Fmi2) {

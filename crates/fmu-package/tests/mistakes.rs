@@ -7,10 +7,26 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tempfile::TempDir;
 
 /// Builds a model with a mistake. Returns the output on the standard error if the build rejects the model, or `None` with a check that the
 /// FMU exists.
 fn rejection(model: &str, mistake: &str, fmi: &str) -> Option<String> {
+    let directory = package(model);
+    let (succeeds, errors) = build(directory.path(), model, mistake, fmi);
+    let exists = ["out", "out/fmi3"].iter().any(|out| {
+        fs::read_dir(directory.path().join(out))
+            .into_iter()
+            .flatten()
+            .flatten()
+            .any(|entry| entry.path().extension().is_some_and(|end| end == "fmu"))
+    });
+    assert_eq!(succeeds, exists, "{model} with {mistake:?}: {errors}");
+    (!exists).then_some(errors)
+}
+
+/// Makes a package with the name of a model.
+fn package(model: &str) -> TempDir {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
     let export = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("fmu-export");
@@ -22,21 +38,17 @@ fn rejection(model: &str, mistake: &str, fmi: &str) -> Option<String> {
     fs::create_dir_all(path("src")).unwrap();
     fs::write(path("src/lib.rs"), "").unwrap();
     fs::create_dir_all(path("modelDescription/resources")).unwrap();
-    fs::write(path("modelDescription/resources/mistake"), mistake).unwrap();
+    directory
+}
+
+/// Builds an FMU with a mistake in the directory of a package. Returns whether the build succeeds, and its output on the standard error.
+fn build(directory: &Path, model: &str, mistake: &str, fmi: &str) -> (bool, String) {
+    fs::write(directory.join("modelDescription/resources/mistake"), mistake).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
     command.args(["fmu", "build", "--no-page", "--fmi", fmi, "--out", "out", "--binary"]);
-    command.arg(format!("{}={}", platform(fmi), library(model).display())).current_dir(directory.path());
+    command.arg(format!("{}={}", platform(fmi), library(model).display())).current_dir(directory);
     let output = command.output().unwrap();
-    let errors = String::from_utf8(output.stderr).unwrap();
-    let exists = ["out", "out/fmi3"].iter().any(|out| {
-        fs::read_dir(path(out))
-            .into_iter()
-            .flatten()
-            .flatten()
-            .any(|entry| entry.path().extension().is_some_and(|end| end == "fmu"))
-    });
-    assert_eq!(output.status.success(), exists, "{model} with {mistake:?}: {errors}");
-    (!exists).then_some(errors)
+    (output.status.success(), String::from_utf8(output.stderr).unwrap())
 }
 
 /// Compiles a model, if cargo has not compiled it with this test.
@@ -75,6 +87,20 @@ fn fields_that_saved_states_lack_are_found() {
     }
     rejects("memory", "size", "3", &["there is no step size", "after `memory in` of variables!"]);
     rejects("memory", "ticks", "2", &["n was ", "after `memory in` of variables!"]);
+}
+
+/// An FMU that has passed is not checked again, but the warnings of the check are repeated. An FMU that has not passed is.
+#[test]
+fn an_fmu_is_checked_once() {
+    let directory = package("memory");
+    let build = |mistake: &str| build(directory.path(), "memory", mistake, "2");
+    let [first, second] = [build("random"), build("random")];
+    let skipped = "memory.fmu has passed this check in an earlier build, so it is not checked again\n";
+    assert!(first.0 && first.1.contains("the results of the model are random") && !first.1.contains(skipped));
+    assert_eq!(second, (true, format!("{skipped}{}", first.1)));
+    let [one, other] = [build("last"), build("last")];
+    assert!(!one.0 && one == other && one.1.contains("after `memory in`"), "{one:?} {other:?}");
+    assert_eq!(build("random"), second);
 }
 
 #[test]
