@@ -28,7 +28,6 @@ histories! {
     clumsy_on_heap ClumsyOnHeap;
     counter Counter;
     fuse Fuse;
-    grumbler Grumbler;
     lag lag::Lag;
     lazy Lazy;
     motor Motor;
@@ -36,7 +35,6 @@ histories! {
     palette Palette;
     rod Rod;
     talker Talker;
-    ticker Ticker;
 }
 
 /// Checks histories without copies, because a variable of the meter counts the steps that `step_fast` made.

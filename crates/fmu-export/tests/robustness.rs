@@ -18,7 +18,7 @@ const MODELS: &[(&str, RunBytes)] =
     models!(Importer: Oscillator Ball Counter Talker Fuse Lazy Motor Rod Meter);
 
 const MODELS_OF_FMI3: &[(&str, RunBytes)] =
-    models!(fmi3::Importer: Oscillator Ball Counter Talker Fuse Ticker Palette Motor Rod Meter);
+    models!(fmi3::Importer: Oscillator Ball Counter Talker Fuse Palette Motor Rod Meter);
 
 /// Functions that never return OK, because steps are synchronous, no model has clocks, and the library does not provide
 /// per-element dependencies or `fmi3EvaluateDiscreteStates`.

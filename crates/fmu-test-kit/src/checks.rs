@@ -139,7 +139,7 @@ pub fn random_contents_break_nothing<F: Either, M: Exported>() {
         fmu.take_log();
     }
     fmu.restore(&original);
-    fmu.step(0.0, 0.01);
+    fmu.ok(fmu.try_step(0.0, 0.01));
     assert!(accepted > DAMAGED / 15, "only {accepted} of {DAMAGED} were accepted");
 }
 

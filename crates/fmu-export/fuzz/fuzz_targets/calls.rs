@@ -25,7 +25,7 @@ const MODELS: [RunBytes; 16] = [
     run::<fmi3::Importer, Talker>,
     run::<fmi3::Importer, Lazy>,
     run::<fmi3::Importer, Fuse>,
-    run::<fmi3::Importer, Ticker>,
+    run::<fmi3::Importer, Meter>,
     run::<fmi3::Importer, Palette>,
     run::<Importer, Rod>,
     run::<fmi3::Importer, Rod>,

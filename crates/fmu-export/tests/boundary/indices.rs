@@ -94,20 +94,14 @@ fn invalid_variables_and_values() {
 mod long {
     use fmu_export::*;
 
-    #[derive(Clone)]
-    pub struct Long {
-        pub field: [f64; 1500],
-        pub grid: [[f64; 12]; 101],
-        pub heat: [f64; 1500],
-    }
-
-    variables! { for Long;
+    variables! {
+        pub struct Long;
         /// Source
-        heat = input(&NUMBER) in heat;
+        heat: [f64; 1500] = input(&NUMBER).start([0.0; 1500]);
         /// State
-        field = output(&NUMBER).state() in field;
+        field: [f64; 1500] = output(&NUMBER).state().start([0.0; 1500]);
         /// Values on a grid
-        grid = local(&NUMBER).state() in grid;
+        grid: [[f64; 12]; 101] = local(&NUMBER).state().start([[0.0; 12]; 101]);
         /// Its rate
         der_grid as "der(grid)" = local(&NUMBER).derivative_of(grid) by |long| long.grid;
         /// Its rate

@@ -1,7 +1,7 @@
 //! Content of log messages, and when they are logged (sections 2.1.5 and 2.2.4 of FMI 2.0).
 
-use crate::models::grumbler::{self, Trouble};
-use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
+use crate::models::clumsy::{ClumsyOnHeapName, Fault};
+use crate::models::{ClumsyOnHeap, Oscillator, Talker, talker::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Status;
@@ -153,35 +153,34 @@ fn messages_of_the_model() {
 /// Checks messages that the model logs in a rejected call and during instantiation.
 #[test]
 fn messages_of_a_model_that_fails() {
-    let fmu = logging::<Grumbler>(false);
+    let fmu = logging::<ClumsyOnHeap>(true);
     let messages =
         |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.message).collect::<Vec<_>>();
-    let trouble =
-        |trouble: Trouble| fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(trouble as i32));
-    assert_eq!(messages(&fmu), ["made"]);
-    let failed =
-        |function: &str, at: &str| [format!("{at} will fail"), format!("{function}: {at} has failed")];
-    assert_eq!(trouble(Trouble::Update), Status::Error);
+    let fails = |fault: Fault| fmu.set_item(ClumsyOnHeapName::fails as u32, fault as i32);
+    assert_eq!(messages(&fmu), ["made", "instantiated"]);
+    let failed = |function: &str, at: &str| {
+        [format!("{at} will fail"), format!("{function}: {at} has failed half-way")]
+    };
+    assert_eq!(fails(Fault::Update), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2SetInteger", "Update"));
-    fmu.ok(trouble(Trouble::Initialize));
+    fmu.ok(fails(Fault::Initialize));
     assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2EnterInitializationMode", "Initialize"));
-    fmu.ok(trouble(Trouble::SecondRound));
+    fmu.ok(fails(Fault::Event));
     fmu.ok(fmu.fmi2EnterInitializationMode());
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
-    assert_eq!(messages(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
+    assert_eq!(messages(&fmu), failed("fmi2ExitInitializationMode", "Event"));
     // The model rejects the de-serialized bytes.
-    let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Trouble::Update as i64).to_le_bytes());
+    let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Fault::Update as i64).to_le_bytes());
     let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
     assert_eq!(status, Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
     fmu.ok(fmu.fmi2Reset());
-    assert_eq!(messages(&fmu), ["made"]);
+    assert_eq!(messages(&fmu), ["reset to the start values", "made"]);
     // The model logs in steps that end at an event.
     fmu.initialize(0.0);
-    fmu.ok(fmu.set_debug_logging(true, &[c"logEvents"]));
     fmu.step(0.0, 2.0);
-    assert_eq!(messages(&fmu), ["stops at 1", "stops at 2"]);
+    assert_eq!(messages(&fmu), ["initialized", "stops at 1", "stops at 2"]);
 }
 
 /// Checks that every instance logs with its name and its environment.

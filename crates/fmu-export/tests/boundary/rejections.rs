@@ -320,24 +320,16 @@ fn instances_of_the_other_version() {
 mod drift {
     use fmu_export::*;
 
-    #[derive(Clone, Default)]
-    pub struct Drift {
-        x: f64,
-    }
-
-    variables! { for Drift;
+    variables! {
+        pub struct Drift;
         /// Grows
-        x = output(&NUMBER).state() in x;
+        x: f64 = output(&NUMBER).state();
         /// Rate
         der_x = local(&NUMBER).derivative_of(x) by |_| 1.0;
     }
 
     impl Model for Drift {
         const INFO: Info = info!("Drift", "drift");
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self::default())
-        }
     }
 
     impl ModelExchange for Drift {}

@@ -42,7 +42,6 @@ fn steps_in_both_versions() {
     same::<Oscillator>();
     same::<Counter>();
     same::<Talker>();
-    same::<Ticker>();
     same::<Palette>();
 }
 

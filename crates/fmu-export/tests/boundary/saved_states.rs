@@ -104,20 +104,24 @@ fn states_are_freed_in_constant_time() {
 /// serialized, because de-serializing it would be rejected.
 #[test]
 fn infinite_numbers() {
-    let fmu = Importer::new::<Grumbler>(CoSimulation);
-    fmu.set(&[grumbler::Name::last as u32], &[0.5]);
+    // The time of the next count is infinity after the last count.
+    let fmu = Importer::in_mode::<Counter>(ModelExchange, Instantiated);
+    fmu.set(&[counter::Name::limit as u32], &[1.0]);
     fmu.initialize(0.0);
-    let other = Importer::new::<Grumbler>(CoSimulation);
+    assert_eq!(fmu.update().next, None);
+    let other = Importer::in_mode::<Counter>(ModelExchange, Instantiated);
     other.restore(&fmu.bytes());
-    other.step(0.0, 1e6);
+    assert_eq!(other.bytes(), fmu.bytes());
+    assert_eq!(other.update().next, None);
 
-    fmu.ok(fmu.set_item(grumbler::Name::trouble as u32, grumbler::Trouble::Heat as i32));
-    fmu.step(0.0, 0.1);
+    let fmu = Importer::initialized_at::<ClumsyOnHeap>(0.0);
+    fmu.set(&[clumsy::ClumsyOnHeapName::u as u32], &[f64::MAX]);
+    fmu.step(0.0, 1.0);
     let (state, mut size) = (fmu.save(), 0);
-    fmu.ok(fmu.fmi2SerializedFMUstateSize(state, &mut size));
+    fmu.ok(fmu.state_size(state, &mut size));
     let mut buffer = vec![0; size];
-    fmu.rejected_with(&["warmer must be a finite number, it is inf"], |fmu| {
-        fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), size)
+    fmu.rejected_with(&["x must be a finite number, it is inf"], |fmu| {
+        fmu.serialize_into(state, buffer.as_mut_ptr(), size)
     });
 }
 
@@ -360,7 +364,9 @@ fn invalid_strings_and_items() {
 
 #[test]
 fn states_of_event_mode() {
-    let (with, without) =
-        (fmi3::Importer::in_mode::<Ticker>(CoSimulation, Event), fmi3::Importer::new::<Ticker>(CoSimulation));
+    let (with, without) = (
+        fmi3::Importer::in_mode::<Counter>(CoSimulation, Event),
+        fmi3::Importer::new::<Counter>(CoSimulation),
+    );
     assert!(without.rejected_bytes(&with.bytes()).contains("Event Mode"));
 }

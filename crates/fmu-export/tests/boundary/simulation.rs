@@ -1,6 +1,6 @@
 //! Tests of [`Simulation`], with which authors test their models without an FMU.
 
-use crate::models::{Rod, Ticker};
+use crate::models::{Counter, Rod};
 use fmu_export::{Interface, Simulation, Value};
 
 /// Checks a scalar variable, elements of arrays and whole arrays, all by their names in the model description.
@@ -39,13 +39,13 @@ fn errors_name_the_mistake() {
 #[test]
 fn events_are_handled() {
     for interface in [Interface::CoSimulation, Interface::ModelExchange] {
-        let mut ticker = Simulation::<Ticker>::of(interface).unwrap();
-        ticker.set("amount", 2.0).unwrap().set("last", 4).unwrap().step_size(0.6).run(0.6).unwrap();
-        assert_eq!((ticker.get("ticks").unwrap(), ticker.get("sum").unwrap()), (3.0, 6.0));
-        assert!(!ticker.has_ended() && ticker.time() == 0.6);
-        ticker.run(9.0).unwrap();
-        assert!(ticker.has_ended() && ticker.time() == 0.75);
-        assert_eq!(ticker.get("ticks").unwrap(), 4.0);
+        let mut counter = Simulation::<Counter>::of(interface).unwrap();
+        counter.set("weight", 2.0).unwrap().set("limit", 8.0).unwrap().step_size(0.6).run(0.6).unwrap();
+        assert_eq!((counter.get("count").unwrap(), counter.get("sum").unwrap()), (3.0, 6.0));
+        assert!(!counter.has_ended() && counter.time() == 0.6);
+        counter.run(9.0).unwrap();
+        assert!(counter.has_ended() && counter.time() == 0.75);
+        assert_eq!(counter.get("count").unwrap(), 4.0);
     }
 }
 
@@ -114,15 +114,15 @@ fn model_exchange_is_integrated() {
 }
 
 /// Checks that another simulation can continue from a saved state. The state must include the `memory` fields of the
-/// model: here `next`, the time of the next tick.
+/// model: here `next`, the time of the next count.
 #[test]
 fn another_simulation_continues_from_a_state() {
-    let mut ticker = Simulation::<Ticker>::new().unwrap();
-    let saved = ticker.step_size(0.3).set("amount", 2.0).unwrap().run(0.6).unwrap().save().unwrap();
-    let mut other = Simulation::<Ticker>::new().unwrap();
+    let mut counter = Simulation::<Counter>::new().unwrap();
+    let saved = counter.step_size(0.3).set("weight", 2.0).unwrap().run(0.6).unwrap().save().unwrap();
+    let mut other = Simulation::<Counter>::new().unwrap();
     other.step_size(0.3).restore(&saved).unwrap();
     assert_eq!(other.time(), 0.6);
-    for simulation in [&mut ticker, &mut other] {
+    for simulation in [&mut counter, &mut other] {
         assert_eq!(simulation.run(1.2).unwrap().get("sum").unwrap(), 10.0);
     }
     assert!(other.restore(&saved[1..]).is_err());

@@ -31,15 +31,15 @@ fn parameters_after_the_initialization() {
 /// Checks that a discrete input may be set to its current value in Continuous-Time Mode, because FMPy does this if an FMU
 /// has an event indicator. Any other value would need an event, so the call is rejected.
 fn unchanged_discrete_inputs<F: Either>() {
-    use counter::Name::{increment, on, weight};
+    use counter::Name::{increment, paused, weight};
     let fmu = F::in_mode::<Counter>(ModelExchange, ContinuousTime);
     let before = fmu.bytes();
     fmu.ok(fmu.set_integer(increment as u32, 1));
-    fmu.ok(fmu.set_boolean(on as u32, 0));
+    fmu.ok(fmu.set_boolean(paused as u32, 0));
     fmu.ok(fmu.try_set(&[weight as u32], &[1.0]));
     assert_eq!(fmu.bytes(), before);
     fmu.rejected("another Integer", |fmu| fmu.set_integer(increment as u32, 2));
-    fmu.rejected("another Boolean", |fmu| fmu.set_boolean(on as u32, 1));
+    fmu.rejected("another Boolean", |fmu| fmu.set_boolean(paused as u32, 1));
     fmu.rejected("another Real", |fmu| fmu.try_set(&[weight as u32], &[1.5]));
     let output = counter::Name::count as u32;
     fmu.rejected("an output", |fmu| fmu.set_integer(output, 0));

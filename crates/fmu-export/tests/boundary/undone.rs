@@ -1,6 +1,6 @@
 //! An error leaves the instance as it was, even if the model has changed everything before it failed.
 
-use crate::models::clumsy::{ClumsyName, Fails};
+use crate::models::clumsy::{ClumsyName, Fault};
 use crate::models::*;
 use fmu_export::Interface::*;
 use fmu_export::{Exported, Status};
@@ -19,37 +19,39 @@ const REALS: [u32; 7] = [
     GAIN,
 ];
 
-fn fails(fmu: &impl Either, fails: Fails) {
-    fmu.ok(fmu.set_integer(FAILS, fails as i32));
+fn fails(fmu: &impl Either, fault: Fault) {
+    fmu.ok(fmu.set_item(FAILS, fault as i32));
 }
 
-/// Everything that an importer can read: the bits of the Reals, the number of events, and the serialized state.
+/// Everything that an importer can read: the bits of the Reals, the number of iterations of events, and the serialized state.
 type Readings = (Vec<u64>, i32, Vec<u8>);
 
 fn readings(fmu: &impl Either) -> Readings {
     let reals = fmu.read(&REALS).into_iter().map(f64::to_bits).collect();
-    (reals, fmu.integer(ClumsyName::count as u32), fmu.bytes())
+    (reals, fmu.integer(ClumsyName::rounds as u32), fmu.bytes())
 }
 
-/// Lets the model fail with `cause`, checks that the call then fails and changes nothing, and removes the cause.
+/// Lets the model fail with `cause`, checks that the call then fails and changes nothing, and removes the cause. Returns
+/// the message.
 #[track_caller]
-fn undone<F: Either>(fmu: &F, cause: Fails, call: impl FnOnce(&F) -> Status) {
+fn undone<F: Either>(fmu: &F, cause: Fault, call: impl FnOnce(&F) -> Status) -> String {
     fails(fmu, cause);
     let before = readings(fmu);
     let message = fmu.rejected(&format!("{cause:?}"), call);
-    assert!(message.contains("it has failed half-way"), "{message}");
+    assert!(message.ends_with(&format!("{cause:?} has failed half-way")), "{message}");
     assert_eq!(readings(fmu), before, "{cause:?}");
-    fails(fmu, Fails::Nothing);
+    fails(fmu, Fault::Nothing);
+    message
 }
 
 /// Initializes the instance, after failed attempts if `with_failures`.
 fn begin<F: Either>(fmu: &F, with_failures: bool) {
     fmu.set(&[U], &[0.5]);
     if with_failures {
-        fails(fmu, Fails::Initialize);
-        fmu.rejected_with(&["it has failed half-way"], |fmu| fmu.enter_initialization_mode(0.0, None));
-        fmu.rejected_with(&["it has failed half-way"], |fmu| fmu.set_integer(FAILS, Fails::Update as i32));
-        fails(fmu, Fails::Nothing);
+        fails(fmu, Fault::Initialize);
+        fmu.rejected_with(&["has failed half-way"], |fmu| fmu.enter_initialization_mode(0.0, None));
+        fmu.rejected_with(&["has failed half-way"], |fmu| fmu.set_item(FAILS, Fault::Update as i32));
+        fails(fmu, Fault::Nothing);
     }
     fmu.initialize(0.0);
 }
@@ -62,11 +64,14 @@ fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Readings, Readi
         let time = 0.35 * f64::from(step);
         if with_failures {
             fmu.set(&[U], &[0.7]);
-            undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 0.35));
-            undone(&fmu, Fails::Step, |fmu| fmu.try_step(time, 1e-3));
+            undone(&fmu, Fault::Step, |fmu| fmu.try_step(time, 0.35));
+            undone(&fmu, Fault::Step, |fmu| fmu.try_step(time, 1e-3));
             if (time + 0.35).floor() > time.floor() {
-                undone(&fmu, Fails::Event, |fmu| fmu.try_step(time, 0.35));
-                undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(time, 0.35));
+                for fault in [Fault::Event, Fault::StepAfterEvent] {
+                    let message = undone(&fmu, fault, |fmu| fmu.try_step(time, 0.35));
+                    let at = format!("DoStep: the step cannot go on at {}: ", time.ceil());
+                    assert!(message.contains(&at), "{message}");
+                }
             }
         }
         fmu.set(&[U], &[0.1 + time]);
@@ -94,19 +99,37 @@ fn steps_of_an_importer_that_handles_events() {
     fn check<M: Exported>() {
         let fmu = fmi3::Importer::make::<M>(&Arguments::with_events::<M>(CoSimulation)).unwrap();
         fmu.initialize(0.0);
+        while fmu.update().again {}
         fmu.leave_event_mode();
-        undone(&fmu, Fails::Step, |fmu| fmu.try_step(0.0, 0.5));
+        undone(&fmu, Fault::Step, |fmu| fmu.try_step(0.0, 0.5));
         let stepped = fmu.do_step(0.0, 1.5).unwrap();
         assert_eq!((stepped.event_handling_needed, stepped.last_successful_time), (true, 1.0));
         fmu.ok(fmu.fmi3EnterEventMode());
-        undone(&fmu, Fails::Event, |fmu| fmu.try_update().unwrap_err());
+        assert!(fmu.update().again);
+        undone(&fmu, Fault::Event, |fmu| fmu.try_update().unwrap_err());
         fmu.update();
         fmu.ok(fmu.fmi3EnterStepMode());
-        undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(1.0, 0.5));
+        undone(&fmu, Fault::StepAfterEvent, |fmu| fmu.try_step(1.0, 0.5));
         fmu.step(1.0, 0.5);
     }
     check::<Clumsy>();
     check::<ClumsyOnHeap>();
+}
+
+/// Checks that an event at the start that fails in its second iteration undoes the first one.
+#[test]
+fn an_event_at_the_start_that_fails() {
+    fn check<F: Either, M: Exported>() {
+        let fmu = F::new::<M>(CoSimulation);
+        fmu.enter_initialization(0.0, None);
+        undone(&fmu, Fault::Event, F::exit_initialization_mode);
+        fmu.ok(fmu.exit_initialization_mode());
+        assert_eq!(fmu.integer(ClumsyName::rounds as u32), 2);
+    }
+    check::<Importer, Clumsy>();
+    check::<Importer, ClumsyOnHeap>();
+    check::<fmi3::Importer, Clumsy>();
+    check::<fmi3::Importer, ClumsyOnHeap>();
 }
 
 #[test]
@@ -117,7 +140,8 @@ fn in_model_exchange() {
         fmu.enter_continuous_time();
         fmu.ok(fmu.set_time(1.0));
         fmu.ok(fmu.enter_event_mode());
-        undone(&fmu, Fails::Event, |fmu| fmu.try_update().unwrap_err());
+        assert!(fmu.update().again);
+        undone(&fmu, Fault::Event, |fmu| fmu.try_update().unwrap_err());
         assert_eq!(fmu.update().next, Some(2.0));
     }
     check::<Importer, Clumsy>();
@@ -133,11 +157,11 @@ fn a_failed_step_may_be_tried_again_after_a_reset() {
         for _ in 0..2 {
             begin(&fmu, true);
             // Until the first step, the level follows the input.
-            undone(&fmu, Fails::StepAfterEvent, |fmu| fmu.try_step(0.0, 1.5));
+            undone(&fmu, Fault::StepAfterEvent, |fmu| fmu.try_step(0.0, 1.5));
             fmu.set(&[U], &[0.9]);
             assert_eq!(fmu.get([ClumsyName::level as u32]), [0.9]);
             fmu.step(0.0, 0.5);
-            undone(&fmu, Fails::Step, |fmu| fmu.try_step(0.5, 0.25));
+            undone(&fmu, Fault::Step, |fmu| fmu.try_step(0.5, 0.25));
             fmu.ok(fmu.reset());
         }
     }

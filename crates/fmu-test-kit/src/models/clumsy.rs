@@ -1,75 +1,76 @@
-//! Models that overwrite their fields before they fail, for tests that the library undoes failed calls.
+//! Models that overwrite their fields before they fail, for tests that the library undoes failed calls. Their steps stop at
+//! events, which have two iterations.
 
 use fmu_export::*;
 
-/// The call that fails, as a value of the parameter `fails`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i32)]
-pub enum Fails {
-    Nothing,
-    Step,
-    /// The step that begins at an event.
-    StepAfterEvent,
-    Event,
-    Initialize,
-    Update,
+enumeration! {
+    /// The call that fails.
+    pub enum Fault {
+        /// Nothing
+        Nothing = 0,
+        /// Every step
+        Step = 1,
+        /// A step that begins at an event
+        StepAfterEvent = 2,
+        /// The second iteration of an event
+        Event = 3,
+        /// The initialization
+        Initialize = 4,
+        /// The calculation that follows new parameters
+        Update = 5,
+    }
 }
 
-/// Defines such a model. `$memory` is the type of `trace`, which stores the last three numbers.
-macro_rules! clumsy {
-    ($model:ident, $names:ident, $memory:ty) => {
-        #[derive(Clone, Default)]
-        pub struct $model {
-            u: f64,
-            x: f64,
-            count: i32,
-            gain: f64,
-            fails: i32,
-            trace: $memory,
-            /// Sum of `trace`, which is not saved; `restored` calculates it again.
-            sum: f64,
-            /// Gain times u, calculated by `update` and `calculate`.
-            product: f64,
-            next: f64,
-            /// Equal to u until the first step.
-            level: f64,
-            has_stepped: bool,
-            /// Calculated only by `calculate`.
-            shown: f64,
-        }
+const FAULT: Type = Type::enumeration("Fault", <Fault as Enumeration>::ITEMS);
 
-        variables! { for $model, names $names, memory in trace, next, level, has_stepped;
+/// Defines such a model. `$memory` is the type of `trace`, which stores the last three numbers, and `$log` the type of its log.
+macro_rules! clumsy {
+    ($model:ident, $names:ident, $memory:ty, $log:ty) => {
+        variables! {
+            pub struct $model {
+                trace: $memory,
+                sum: f64,
+                level: f64,
+                shown: f64,
+                /// Gain times u, calculated by `update` and `calculate`.
+                product: f64,
+                next: f64,
+                has_stepped: bool,
+                log: $log,
+            }, names $names, memory in trace, next, level, has_stepped;
+
+            /// What fails
+            fails: Fault = parameter(&FAULT).start(Fault::Nothing);
             /// Input
-            u = input(&NUMBER) in u;
+            u: f64 = input(&NUMBER);
             /// State
-            x = output(&NUMBER).state() in x;
+            x: f64 = output(&NUMBER).state();
             /// Its rate
             der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |model| model.product;
-            /// Number of events
-            count = output(&INTEGER).exact() in count;
-            /// Follows the memory
+            /// Number of iterations of events
+            rounds: i32 = output(&INTEGER).exact();
+            /// Sum of the memory, which is not saved; `restored` calculates it again
             sum = output(&NUMBER) from sum;
-            /// The first u
+            /// The input until the first step
             level = output(&NUMBER) by |model| model.level;
-            /// Calculated
+            /// State plus time, which only `calculate` calculates
             shown = output(&NUMBER) from shown;
             /// Parameter
-            gain = parameter(&NUMBER) in gain;
-            /// What fails
-            fails = parameter(&INTEGER) in fails;
+            gain: f64 = parameter(&NUMBER).start(2.0);
         }
 
         impl $model {
-            /// If `fails` is true, overwrites the fields and returns an error.
-            fn fail_if(&mut self, fails: bool) -> Result<(), Error> {
-                if !fails {
+            /// If `fault` is what fails, overwrites the fields and returns an error.
+            fn fail_at(&mut self, fault: Fault) -> Result<(), Error> {
+                if self.fails != fault {
                     return Ok(());
                 }
-                (self.u, self.x, self.count, self.gain) = (-1e3, -2e3, -3, -4e3);
-                (self.next, self.product, self.fails) = (-5e3, -6e3, 0);
+                self.log.note(format!("{fault:?} will fail"));
+                (self.u, self.x, self.rounds, self.gain) = (-1e3, -2e3, -3, -4e3);
+                (self.next, self.product, self.fails) = (-5e3, -6e3, Fault::Nothing);
                 (self.level, self.shown) = (-8e3, -9e3);
                 self.collect(-7e3);
-                Err(Error::new("it has failed half-way"))
+                Err(Error::new(format!("{fault:?} has failed half-way")))
             }
 
             fn collect(&mut self, number: f64) {
@@ -79,16 +80,16 @@ macro_rules! clumsy {
         }
 
         impl Model for $model {
-            const INFO: Info = Info {
-                ..info!(stringify!($model), "clumsy")
-            };
+            const INFO: Info = Info { ..info!(stringify!($model), "clumsy") };
 
             fn new(_: &Setup) -> Result<Self, Error> {
-                Ok(Self { gain: 2.0, ..Self::default() })
+                let mut model = Self::default();
+                model.log.note("made".to_owned());
+                Ok(model)
             }
 
             fn update(&mut self) -> Result<(), Error> {
-                self.fail_if(self.fails == Fails::Update as i32)?;
+                self.fail_at(Fault::Update)?;
                 self.product = self.gain * self.u;
                 Ok(())
             }
@@ -99,8 +100,8 @@ macro_rules! clumsy {
             }
 
             fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
-                self.fail_if(self.fails == Fails::Initialize as i32)?;
-                self.next = experiment.start_time + 1.0;
+                self.fail_at(Fault::Initialize)?;
+                self.next = experiment.start_time;
                 Ok(())
             }
 
@@ -114,6 +115,10 @@ macro_rules! clumsy {
                     self.level = self.u;
                 }
             }
+
+            fn log(&mut self) -> Option<&mut Log> {
+                self.log.log()
+            }
         }
 
         impl CoSimulation for $model {
@@ -124,10 +129,15 @@ macro_rules! clumsy {
                 self.has_stepped = true;
                 self.x += self.gain * self.u * (end - step.time);
                 self.collect(self.x);
-                self.fail_if(self.fails == Fails::Step as i32)?;
-                let is_after_event = step.time == self.next - 1.0 && self.count > 0;
-                self.fail_if(is_after_event && self.fails == Fails::StepAfterEvent as i32)?;
-                Ok(if end == self.next { Stepped::Event(end) } else { Stepped::Done })
+                self.fail_at(Fault::Step)?;
+                if step.time == self.next - 1.0 && self.rounds > 2 {
+                    self.fail_at(Fault::StepAfterEvent)?;
+                }
+                if end < self.next {
+                    return Ok(Stepped::Done);
+                }
+                self.log.note(format!("stops at {end}"));
+                Ok(Stepped::Event(end))
             }
         }
 
@@ -136,14 +146,19 @@ macro_rules! clumsy {
                 self.has_stepped = true;
             }
 
+            /// Begins at the start, and has two iterations every second.
             fn event(&mut self, time: f64) -> Result<Event, Error> {
+                let mut again = false;
                 if time >= self.next {
-                    self.count = self.count.saturating_add(1);
-                    self.next += 1.0;
+                    self.rounds = self.rounds.saturating_add(1);
                     self.collect(time);
-                    self.fail_if(self.fails == Fails::Event as i32)?;
+                    again = self.rounds % 2 == 1;
+                    if !again {
+                        self.next += 1.0;
+                        self.fail_at(Fault::Event)?;
+                    }
                 }
-                Ok(Event { next: Some(self.next), ..Event::default() })
+                Ok(Event { again, next: Some(self.next), ..Event::default() })
             }
         }
 
@@ -173,5 +188,26 @@ impl Collects for Vec<f64> {
     }
 }
 
-clumsy!(Clumsy, ClumsyName, [f64; 3]);
-clumsy!(ClumsyOnHeap, ClumsyOnHeapName, Vec<f64>);
+/// A log, or none.
+trait Notes {
+    fn note(&mut self, _: String) {}
+
+    fn log(&mut self) -> Option<&mut Log> {
+        None
+    }
+}
+
+impl Notes for () {}
+
+impl Notes for Log {
+    fn note(&mut self, message: String) {
+        self.event(message);
+    }
+
+    fn log(&mut self) -> Option<&mut Log> {
+        Some(self)
+    }
+}
+
+clumsy!(Clumsy, ClumsyName, [f64; 3], ());
+clumsy!(ClumsyOnHeap, ClumsyOnHeapName, Vec<f64>, Log);

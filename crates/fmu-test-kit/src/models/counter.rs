@@ -1,114 +1,79 @@
-//! A counter with a fixed period: time events, event iteration, Integers and Booleans.
+//! A counter with a fixed period: time events with several iterations, at which steps stop; discrete inputs.
 
 use fmu_export::*;
-
-/// Adds its input to a count in every period. When the count reaches `full`, the counter divides it by `full`: the quotient
-/// is added to `carries`, and the remainder stays.
-#[derive(Clone)]
-pub struct Counter {
-    on: bool,
-    increment: i32,
-    weight: f64,
-    count: i32,
-    carries: i32,
-    sum: f64,
-    period: f64,
-    full: i32,
-    /// Time of the next count.
-    next: f64,
-}
 
 const PERIOD: Type = Type::real("Period", &units::S).min(1e-3).max(1e3);
 const DIGITS: Type = Type::integer("Digits").min_integer(2);
 
-variables! { for Counter, memory in next;
-    /// Whether it counts
-    on = input(&BOOLEAN) in on;
+variables! {
+    /// Adds its input to a count at the start and after every period. If the count reaches `full`, another iteration of the
+    /// event keeps only the remainder of its division by `full`.
+    pub struct Counter {
+        /// Time of the next count; infinity after the last one.
+        next: f64,
+    }, memory in next;
+
+    /// Whether it does not count
+    paused: bool = input(&BOOLEAN);
     /// Increment
-    increment = input(&INTEGER) in increment;
+    increment: i32 = input(&INTEGER).start(1);
     /// Weight of the increments; changes at events only
-    weight = input(&NUMBER).discrete() in weight;
+    weight: f64 = input(&NUMBER).discrete().start(1.0);
     /// Count
-    count = output(&INTEGER).exact() in count;
-    /// How often the count was full
-    carries = output(&INTEGER).exact() in carries;
+    count: i32 = output(&INTEGER).exact();
     /// Weight of all increments
-    sum = output(&NUMBER).discrete().exact() in sum;
-    /// Whether the count is odd
-    odd = output(&BOOLEAN) by |counter| counter.count % 2 != 0;
+    sum: f64 = output(&NUMBER).discrete().exact();
     /// Time between two counts
-    period = parameter(&PERIOD) in period;
+    period: f64 = parameter(&PERIOD).start(0.25);
     /// Smallest count that is too large
-    full = parameter(&DIGITS) in full;
+    full: i32 = parameter(&DIGITS).start(10);
+    /// Sum that ends the simulation
+    limit: f64 = parameter(&NUMBER).start(1e9);
 }
 
 impl Counter {
     fn tick(&mut self) -> Result<(), Error> {
-        if self.on {
+        if !self.paused {
             self.count = self.count.saturating_add(self.increment);
             self.sum += self.weight * f64::from(self.increment);
         }
         if !self.sum.is_finite() {
             return Err(Error::new("the sum would not be finite"));
         }
-        self.next += self.period;
+        self.next = if self.sum < self.limit { self.next + self.period } else { f64::INFINITY };
         Ok(())
-    }
-
-    fn carry(&mut self) {
-        self.carries = self.carries.wrapping_add(self.count / self.full);
-        self.count %= self.full;
     }
 }
 
 impl Model for Counter {
     const INFO: Info = Info { description: "Counts in regular intervals", ..info!("Counter", "counter") };
 
-    fn new(_: &Setup) -> Result<Self, Error> {
-        let (on, increment, weight, count, carries, sum) = (false, 1, 1.0, 0, 0, 0.0);
-        Ok(Self { on, increment, weight, count, carries, sum, period: 0.1, full: 10, next: 0.1 })
-    }
-
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
-        self.next = experiment.start_time + self.period;
+        self.next = experiment.start_time;
         Ok(())
     }
 }
 
 impl ModelExchange for Counter {
-    /// Either carries or counts, not both. If more is due at the same time, the event requests another iteration (section
+    /// Either divides or counts, not both. If more is due at the same time, the event requests another iteration (section
     /// 3.2.2 of FMI 2.0).
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.count >= self.full {
-            self.carry();
+            self.count %= self.full;
         } else if time >= self.next {
             self.tick()?;
         }
         let again = self.count >= self.full || time >= self.next;
-        Ok(Event { again, next: Some(self.next), ..Event::default() })
+        let next = Some(self.next).filter(|next| next.is_finite());
+        Ok(Event { again, next, terminate: next.is_none(), ..Event::default() })
     }
 }
 
 impl CoSimulation for Counter {
+    const EVENTS: Events = Events::Stop;
+
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
-        const MOST: f64 = 1000.0;
-        // A tick at the end of the step belongs to this step even if a rounding error puts it just after the end.
-        let end = step.time + step.size + 1e-9 * self.period;
-        if end - self.next > MOST * self.period || end + self.period == end {
-            return Err(Error::new(format!(
-                "a step may have at most {MOST} periods, and a period must not vanish when it is added to the time"
-            )));
-        }
-        // A step that fails must leave the model as it was.
-        let mut counter = self.clone();
-        while counter.next <= end {
-            counter.tick()?;
-            if counter.count >= counter.full {
-                counter.carry();
-            }
-        }
-        *self = counter;
-        Ok(Stepped::Done)
+        if step.time + step.size >= self.next { Ok(Stepped::Event(self.next)) } else { Ok(Stepped::Done) }
     }
 }
 

@@ -2,30 +2,21 @@
 
 use fmu_export::*;
 
-/// Warms up under a load. A step that would exceed 100 degrees ends early at 100, so that the importer learns the time. At
-/// 200 degrees the fuse melts, and the simulation ends.
-#[derive(Clone)]
-pub struct Fuse {
-    load: f64,
-    temperature: f64,
-}
-
-variables! { for Fuse;
-    /// Degrees per second
-    load = input(&NUMBER) in load;
-    /// Degrees
-    temperature = output(&NUMBER).exact() in temperature;
-}
-
 const HOT: f64 = 100.0;
 const MELTED: f64 = 200.0;
 
+variables! {
+    /// Warms up under a load. A step that would exceed 100 degrees ends early at 100, so that the importer learns the time. At
+    /// 200 degrees the fuse melts, and the simulation ends.
+    pub struct Fuse;
+    /// Degrees per second
+    load: f64 = input(&NUMBER).start(10.0);
+    /// Degrees
+    temperature: f64 = output(&NUMBER).exact().start(20.0);
+}
+
 impl Model for Fuse {
     const INFO: Info = info!("Fuse", "fuse");
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self { load: 10.0, temperature: 20.0 })
-    }
 }
 
 impl CoSimulation for Fuse {

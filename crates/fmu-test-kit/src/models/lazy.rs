@@ -2,32 +2,25 @@
 
 use fmu_export::*;
 
-/// Calculates and stores the sum of all its values.
-#[derive(Clone)]
-pub struct Lazy {
-    real: f64,
-    integer: i32,
-    boolean: bool,
-    string: String,
-    weight: f64,
-    state: f64,
-    slope: f64,
-    sum: f64,
-}
+variables! {
+    /// Calculates and stores the sum of all its values.
+    pub struct Lazy {
+        slope: f64,
+        sum: f64 = f64::NAN,
+    }, memory in slope;
 
-variables! { for Lazy, memory in slope;
     /// A summand
-    real = input(&NUMBER) in real;
+    real: f64 = input(&NUMBER).start(1.0);
     /// Another
-    integer = input(&INTEGER) in integer;
+    integer: i32 = input(&INTEGER).start(2);
     /// 1 more, and steps end half-way
-    boolean = input(&BOOLEAN) in boolean;
+    boolean: bool = input(&BOOLEAN);
     /// Its length
-    string = input(&STRING) in string;
+    string: String = input(&STRING).start("abc".to_owned());
     /// A parameter
-    weight = parameter(&NUMBER) in weight;
+    weight: f64 = parameter(&NUMBER).start(4.0);
     /// A state
-    state = output(&NUMBER).state() in state;
+    state: f64 = output(&NUMBER).state().start(5.0);
     /// Its rate, which is the sum as well
     der_state as "der(state)" = local(&NUMBER).derivative_of(state) by |lazy| lazy.sum;
     /// The sum as it was calculated
@@ -47,11 +40,6 @@ impl Lazy {
 
 impl Model for Lazy {
     const INFO: Info = info!("Lazy", "lazy");
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        let (real, integer, boolean, string) = (1.0, 2, false, "abc".to_owned());
-        Ok(Self { real, integer, boolean, string, weight: 4.0, state: 5.0, slope: 0.0, sum: f64::NAN })
-    }
 
     fn calculate(&mut self, time: f64) {
         self.sum = self.summands() + time;

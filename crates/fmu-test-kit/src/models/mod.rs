@@ -1,5 +1,4 @@
-//! Short, complete test models that together use all features of FMI 2.0. Some, such as `Palette`, `Rod` and `Ticker`, also
-//! use features that only FMI 3.0 has. The README of this crate lists what each is for.
+//! Short, complete test models that together use all features of FMI 2.0. Some, such as `Palette` and `Rod`, also use features that only FMI 3.0 has. The README of this crate lists what each is for.
 #![allow(missing_docs, reason = "the table of variables describes a model")]
 
 #[path = "../../../fmu-package/models/ball/src/ball.rs"]
@@ -8,7 +7,6 @@ pub mod clumsy;
 pub mod counter;
 pub mod faulty;
 pub mod fuse;
-pub mod grumbler;
 pub mod lazy;
 pub mod meter;
 #[path = "../../../fmu-package/models/motor/src/motor.rs"]
@@ -17,14 +15,12 @@ pub mod oscillator;
 pub mod palette;
 pub mod rod;
 pub mod talker;
-pub mod ticker;
 
 pub use ball::Ball;
 pub use clumsy::{Clumsy, ClumsyOnHeap};
 pub use counter::Counter;
 pub use faulty::Faulty;
 pub use fuse::Fuse;
-pub use grumbler::Grumbler;
 pub use lazy::Lazy;
 pub use meter::Meter;
 pub use motor::Motor;
@@ -32,7 +28,6 @@ pub use oscillator::Oscillator;
 pub use palette::Palette;
 pub use rod::Rod;
 pub use talker::Talker;
-pub use ticker::Ticker;
 
 fmu_export::offer!(Ball: CoSimulation + ModelExchange);
 fmu_export::offer!(Motor: CoSimulation + ModelExchange);

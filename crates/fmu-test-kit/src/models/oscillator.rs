@@ -2,21 +2,6 @@
 
 use fmu_export::*;
 
-/// m v' = F - k x - c v, solved exactly if the force changes linearly during a step.
-#[derive(Clone)]
-pub struct Oscillator {
-    force: f64,
-    /// Slope of the force in the next step, if the importer has set one.
-    slope: Option<f64>,
-    position: f64,
-    velocity: f64,
-    mass: f64,
-    stiffness: f64,
-    springs: i32,
-    damping: f64,
-    damped: bool,
-}
-
 const FORCE: Type = Type::real("Force", &Unit::new("N").kg(1).m(1).s(-2));
 const POSITION: Type = Type::real("Position", &Unit::new("m").m(1)).nominal(0.1);
 const VELOCITY: Type = Type::real("Velocity", &Unit::new("m/s").m(1).s(-1)).nominal(0.5);
@@ -27,13 +12,19 @@ const STIFFNESS: Type = Type::real("Stiffness", &Unit::new("N/m").kg(1).s(-2)).m
 const DAMPING: Type = Type::real("Damping", &Unit::new("N.s/m").kg(1).s(-1)).min(0.0);
 const SPRINGS: Type = Type::integer("Springs").min_integer(1).max_integer(9);
 
-variables! { for Oscillator, memory in slope;
+variables! {
+    /// m v' = F - k x - c v, solved exactly if the force changes linearly during a step.
+    pub struct Oscillator {
+        /// Slope of the force in the next step, if the importer has set one.
+        slope: Option<f64>,
+    }, memory in slope;
+
     /// Force on the mass
-    force = input(&FORCE) in force;
+    force: f64 = input(&FORCE);
     /// Position of the mass
-    position = output(&POSITION).state() in position;
+    position: f64 = output(&POSITION).state();
     /// Velocity of the mass
-    velocity = local(&VELOCITY).state() in velocity;
+    velocity: f64 = local(&VELOCITY).state();
     /// Rate of the position
     der_position as "der(position)" = local(&VELOCITY).derivative_of(position).depends_on(&[velocity])
         by |o| o.velocity;
@@ -44,15 +35,15 @@ variables! { for Oscillator, memory in slope;
     /// Energy in springs and mass
     energy = output(&ENERGY) by |o| 0.5 * (o.all_springs() * o.position.powi(2) + o.mass * o.velocity.powi(2));
     /// Mass
-    mass = parameter(&MASS) in mass;
+    mass: f64 = parameter(&MASS).start(2.0);
     /// Stiffness of one spring
-    stiffness = parameter(&STIFFNESS) in stiffness;
+    stiffness: f64 = parameter(&STIFFNESS).start(50.0);
     /// Number of springs in parallel
-    springs = parameter(&SPRINGS) in springs;
+    springs: i32 = parameter(&SPRINGS).start(1);
     /// Damping
-    damping = parameter(&DAMPING) in damping;
+    damping: f64 = parameter(&DAMPING).start(0.5);
     /// Whether there is a damper
-    damped = parameter(&BOOLEAN) in damped;
+    damped: bool = parameter(&BOOLEAN).start(true);
 }
 
 impl Oscillator {
@@ -77,20 +68,6 @@ impl Oscillator {
 
 impl Model for Oscillator {
     const INFO: Info = Info { description: "Mass on springs", ..info!("Oscillator", "oscillator") };
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self {
-            force: 0.0,
-            slope: None,
-            position: 0.0,
-            velocity: 0.0,
-            mass: 2.0,
-            stiffness: 50.0,
-            springs: 1,
-            damping: 0.5,
-            damped: true,
-        })
-    }
 
     fn update(&mut self) -> Result<(), Error> {
         let (_, frequency_squared) = self.decay_and_frequency_squared();

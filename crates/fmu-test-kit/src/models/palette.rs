@@ -1,4 +1,4 @@
-//! A model with a variable of every type.
+//! A model with a variable of every type, also of one that an author defines, and with an array of binary values.
 
 use fmu_export::*;
 
@@ -12,24 +12,28 @@ enumeration! {
     }
 }
 
-/// Stores the values that are set and calculates nothing.
-#[derive(Clone, Default)]
-pub struct Palette {
-    float64: f64,
-    float32: f32,
-    int8: i8,
-    uint8: u8,
-    int16: i16,
-    uint16: u16,
-    int32: i32,
-    uint32: u32,
-    int64: i64,
-    uint64: u64,
-    boolean: bool,
-    string: String,
-    binary: Vec<u8>,
-    colour: Option<Colour>,
-    shade: f32,
+/// A temperature in a type that the author of a model may define, with only the required functions.
+#[derive(Clone, Copy)]
+pub struct Celsius(pub f64);
+
+impl Saved for Celsius {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        self.0.visit(visitor);
+    }
+}
+
+impl Scalar for Celsius {
+    const BASE: BaseType = BaseType::Real;
+
+    fn value(&self) -> Value {
+        Value::Real(self.0)
+    }
+
+    fn assign(&mut self, value: &Value) {
+        if let Value::Real(value) = value {
+            self.0 = *value;
+        }
+    }
 }
 
 const SMALL: Type = Type::float32("Small", &units::ONE).max(8.0);
@@ -43,45 +47,49 @@ const UINT64: Type = Type::whole("", BaseType::UInt64);
 const PICTURE: Type = Type::binary("Picture", "image/png").max_size(16);
 const COLOUR: Type = Type::enumeration("Colour", <Colour as Enumeration>::ITEMS);
 
-variables! { for Palette;
+variables! {
+    /// Stores the values that are set.
+    pub struct Palette;
     /// Float64
-    float64 = input(&NUMBER) in float64;
+    float64: f64 = input(&NUMBER);
     /// Float32
-    float32 = input(&SMALL) in float32;
+    float32: f32 = input(&SMALL);
     /// Int8
-    int8 = input(&INT8) in int8;
+    int8: i8 = input(&INT8);
     /// UInt8
-    uint8 = input(&UINT8) in uint8;
+    uint8: u8 = input(&UINT8);
     /// Int16
-    int16 = input(&INT16) in int16;
+    int16: i16 = input(&INT16);
     /// UInt16
-    uint16 = parameter(&UINT16).tunable() in uint16;
+    uint16: u16 = parameter(&UINT16).tunable().start(8080);
     /// Int32
-    int32 = input(&INTEGER) in int32;
+    int32: i32 = input(&INTEGER);
     /// UInt32
-    uint32 = input(&UINT32) in uint32;
+    uint32: u32 = input(&UINT32);
     /// Int64
-    int64 = input(&INT64) in int64;
+    int64: i64 = input(&INT64);
     /// UInt64
-    uint64 = input(&UINT64) in uint64;
+    uint64: u64 = input(&UINT64);
     /// Boolean
-    boolean = input(&BOOLEAN) in boolean;
+    boolean: bool = input(&BOOLEAN);
     /// String
-    string = input(&STRING) in string;
+    string: String = input(&STRING);
     /// Binary
-    binary = input(&PICTURE) in binary;
+    binary: Vec<u8> = input(&PICTURE);
     /// Enumeration
-    colour = output(&COLOUR) by |palette| palette.colour.unwrap_or(Colour::Red);
+    colour = output(&COLOUR) by |_| Colour::Red;
     /// Float32 parameter with a maximum
-    shade = parameter(&SMALL) in shade;
+    shade: f32 = parameter(&SMALL);
+    /// Twice the Float32
+    twice = output(&SMALL) by |palette| 2.0 * palette.float32;
+    /// Temperature in a type of the author
+    celsius: Celsius = input(&NUMBER).start(Celsius(20.0));
+    /// Two binary values
+    pair: [Vec<u8>; 2] = input(&BINARY);
 }
 
 impl Model for Palette {
     const INFO: Info = info!("Palette", "palette");
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self { uint16: 8080, ..Self::default() })
-    }
 }
 
 impl CoSimulation for Palette {

@@ -1,5 +1,6 @@
 //! A heated rod with arrays of Reals, Integers, Booleans, Strings and Enumerations, as states, inputs, parameters and
 //! outputs.
+#![allow(non_snake_case, reason = "T is the symbol of a temperature")]
 
 use fmu_export::*;
 
@@ -16,22 +17,6 @@ enumeration! {
     }
 }
 
-/// Each piece obeys C T' = conductance times the temperature differences to its neighbours + power of its heater. The far
-/// end of the rod is insulated.
-#[derive(Clone)]
-pub struct Rod {
-    wall: f64,
-    power: [f64; HEATERS],
-    switches: [Switch; HEATERS],
-    temperatures: [f64; PIECES],
-    capacities: [f64; PIECES],
-    conductance: f64,
-    limits: [[f64; 2]; HEATERS],
-    counted: [i32; HEATERS],
-    hot: [bool; PIECES],
-    labels: [String; HEATERS],
-}
-
 const TEMPERATURE: Type = Type::real("Temperature", &Unit::new("degC").K(1)).nominal(100.0);
 const RATE: Type = Type::real("TemperatureRate", &Unit::new("K/s").K(1).s(-1));
 const POWER: Type = Type::real("Power", &Unit::new("W").kg(1).m(2).s(-3)).nominal(10.0);
@@ -41,34 +26,37 @@ const CONDUCTANCE: Type =
 const SWITCH: Type = Type::enumeration("Switch", <Switch as Enumeration>::ITEMS);
 const COUNT: Type = Type::integer("Count").min_integer(0).max_integer(9);
 
-variables! { for Rod;
+variables! {
+    /// Each piece obeys C T' = conductance times the temperature differences to its neighbours + power of its heater. The far
+    /// end of the rod is insulated.
+    pub struct Rod;
     /// Temperature of the wall at the start of the rod
-    wall = input(&TEMPERATURE) in wall;
+    wall: f64 = input(&TEMPERATURE).start(20.0);
     /// Temperatures of the pieces
-    T = output(&TEMPERATURE).state() in temperatures;
+    T: [f64; PIECES] = output(&TEMPERATURE).state().start(std::array::from_fn(|piece| 20.0 + piece as f64));
     /// Power of the heaters, each for half of the rod
-    power = input(&POWER) in power;
+    power: [f64; HEATERS] = input(&POWER).start([10.0, 5.0]);
     /// Whether the heaters are switched on
-    switches = input(&SWITCH) in switches;
+    switches: [Switch; HEATERS] = input(&SWITCH).start([Switch::On, Switch::Off]);
     /// Rates of the temperatures
     der_T as "der(T)" = local(&RATE).derivative_of(T).depends_on(wall, T, power, switches, capacities, conductance)
         by |rod| rod.rates();
     /// Mean temperature
-    mean = output(&TEMPERATURE).depends_on(&[T]) by |rod| rod.temperatures.iter().sum::<f64>() / PIECES as f64;
+    mean = output(&TEMPERATURE).depends_on(&[T]) by |rod| rod.T.iter().sum::<f64>() / PIECES as f64;
     /// Means of the halves
     means = output(&TEMPERATURE).depends_on(T) by |rod| rod.means();
     /// Capacities of the pieces
-    capacities = parameter(&CAPACITY) in capacities;
+    capacities: [f64; PIECES] = parameter(&CAPACITY).start(std::array::from_fn(|piece| 2.0 + 0.125 * piece as f64));
     /// Conductance from piece to piece
-    conductance = parameter(&CONDUCTANCE) in conductance;
+    conductance: f64 = parameter(&CONDUCTANCE).start(0.5);
     /// Temperatures of each half below which it is cold and above which it is warm
-    limits = parameter(&TEMPERATURE) in limits;
+    limits: [[f64; 2]; HEATERS] = parameter(&TEMPERATURE).start([[10.0, 25.0], [12.5, 30.0]]);
     /// Whether a piece is above the upper limit of its half, since the last step or event
-    hot = output(&BOOLEAN).exact().depends_on(&[]) in hot;
+    hot: [bool; PIECES] = output(&BOOLEAN).exact().depends_on(&[]);
     /// A number for each half
-    counted = parameter(&COUNT) in counted then |rod| { rod.conductance = rod.conductance.min(1.0); };
+    counted: [i32; HEATERS] = parameter(&COUNT).start([1, 2]) then |rod| { rod.conductance = rod.conductance.min(1.0); };
     /// Names of the halves
-    labels = parameter(&STRING) in labels;
+    labels: [String; HEATERS] = parameter(&STRING).start(["the near half".to_owned(), "the far half".to_owned()]);
     /// Names of the halves and whether they are warm
     reports = output(&STRING).depends_on(&[T, limits, labels]) by |rod| rod.reports();
 }
@@ -79,7 +67,7 @@ impl Rod {
     }
 
     fn rates(&self) -> [f64; PIECES] {
-        self.rates_at(&self.temperatures)
+        self.rates_at(&self.T)
     }
 
     fn rates_at(&self, temperatures: &[f64; PIECES]) -> [f64; PIECES] {
@@ -95,9 +83,7 @@ impl Rod {
 
     fn means(&self) -> [f64; HEATERS] {
         let half = PIECES / HEATERS;
-        std::array::from_fn(|heater| {
-            self.temperatures[heater * half..][..half].iter().sum::<f64>() / half as f64
-        })
+        std::array::from_fn(|heater| self.T[heater * half..][..half].iter().sum::<f64>() / half as f64)
     }
 
     fn reports(&self) -> [String; HEATERS] {
@@ -116,7 +102,7 @@ impl Rod {
     }
 
     fn above(&self, piece: usize) -> f64 {
-        self.temperatures[piece] - self.limits[Self::heater(piece)][1]
+        self.T[piece] - self.limits[Self::heater(piece)][1]
     }
 
     fn look(&mut self) {
@@ -136,21 +122,6 @@ impl Model for Rod {
         ..info!("Rod", "rod")
     };
 
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self {
-            wall: 20.0,
-            power: [10.0, 5.0],
-            switches: [Switch::On, Switch::Off],
-            temperatures: std::array::from_fn(|piece| 20.0 + piece as f64),
-            capacities: std::array::from_fn(|piece| 2.0 + 0.125 * piece as f64),
-            conductance: 0.5,
-            limits: [[10.0, 25.0], [12.5, 30.0]],
-            counted: [1, 2],
-            labels: ["the near half".to_owned(), "the far half".to_owned()],
-            hot: [false; PIECES],
-        })
-    }
-
     fn update(&mut self) -> Result<(), Error> {
         match self.limits.iter().all(|[low, high]| low <= high) {
             true => Ok(()),
@@ -163,7 +134,7 @@ impl CoSimulation for Rod {
     /// Uses the explicit Euler method. In steps of up to 100 s, its substeps are short enough for any capacity.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let count = (step.size / 0.01).ceil().clamp(1.0, 1e4);
-        let mut next = self.temperatures;
+        let mut next = self.T;
         for _ in 0..count as usize {
             let rates = self.rates_at(&next);
             next.iter_mut().zip(rates).for_each(|(next, rate)| *next += step.size / count * rate);
@@ -171,7 +142,7 @@ impl CoSimulation for Rod {
         if !next.iter().all(|temperature| temperature.is_finite()) {
             return Err(Error::new("a temperature would not be finite"));
         }
-        self.temperatures = next;
+        self.T = next;
         self.look();
         Ok(Stepped::Done)
     }

@@ -15,51 +15,45 @@ enumeration! {
     }
 }
 
-/// Repeats what it hears, in a way that depends on its mood.
-#[derive(Clone)]
-pub struct Talker {
-    heard: String,
-    greeting: String,
-    mood: Mood,
-    volume: f64,
-    radicand: f64,
-    guess: f64,
-    root: f64,
-    /// The greeting, and the replies so far; at most 100 strings.
-    said: Vec<String>,
-    who: String,
-    words: String,
-    experiment: Experiment,
-    log: Log,
-}
-
 const MOOD: Type = Type::enumeration("Mood", <Mood as Enumeration>::ITEMS);
 const LEVEL: Type = Type::real("Level", &units::ONE).min(0.0).max(11.0);
 const SQUARE: Type = Type::real("Square", &units::ONE).min(1e-6).max(1e6);
 
-variables! { for Talker, memory in said, experiment.start_time, experiment.stop_time, experiment.tolerance;
+variables! {
+    /// Repeats what it hears, in a way that depends on its mood.
+    pub struct Talker {
+        /// The greeting, and the replies so far; at most 100 strings.
+        said: Vec<String>,
+        /// The root that was found.
+        found: f64 = 1.0,
+        who: String,
+        words: String,
+        experiment: Experiment,
+        log: Log,
+    }, memory in said, experiment.start_time, experiment.stop_time, experiment.tolerance;
+
     /// String that it hears
-    heard = input(&STRING) in heard;
+    heard: String = input(&STRING);
     /// Reply
     reply = output(&STRING) by |talker| talker.reply();
     /// Last reply
     said = output(&STRING) by |talker| talker.said.last().cloned().unwrap_or_default();
     /// First reply
-    greeting = parameter(&STRING) in greeting;
+    greeting: String = parameter(&STRING).start("Hello".to_owned());
     /// How it talks
-    mood = input(&MOOD) in mood;
+    mood: Mood = input(&MOOD).start(Mood::Calm);
     /// Mood again
     own_mood = output(&MOOD) by |talker| talker.mood;
     /// Volume, tunable during the simulation
-    volume = parameter(&LEVEL).tunable() in volume;
+    volume: f64 = parameter(&LEVEL).tunable().start(5.0);
     /// Volume in decibels
     decibels = calculated_parameter(&NUMBER).tunable() by |talker| 20.0 * (1e-3 + talker.volume).log10();
     /// Length of the greeting
     length = calculated_parameter(&INTEGER) by |talker| talker.greeting.len() as i32;
     /// Number whose square root it finds
-    square = parameter(&SQUARE) in radicand;
+    square: f64 = parameter(&SQUARE).start(2.0);
     /// The root, from a start value on
-    root = local(&NUMBER).approx() in guess by |talker| talker.root;
+    root: f64 = local(&NUMBER).approx().start(1.0) by |talker| talker.found;
     /// The answer
     answer = output(&INTEGER).constant() by |_| 42;
     /// The time
@@ -98,20 +92,7 @@ impl Model for Talker {
             Some(Ok(words)) => words.trim().to_owned(),
             _ => "none".to_owned(),
         };
-        Ok(Self {
-            heard: String::new(),
-            greeting: "Hello".to_owned(),
-            mood: Mood::Calm,
-            volume: 5.0,
-            radicand: 2.0,
-            guess: 1.0,
-            root: 1.0,
-            said: Vec::new(),
-            who: setup.instance_name.clone(),
-            words,
-            experiment: Experiment::default(),
-            log: Log::default(),
-        })
+        Ok(Self { who: setup.instance_name.clone(), words, ..Self::default() })
     }
 
     fn update(&mut self) -> Result<(), Error> {
@@ -129,11 +110,11 @@ impl Model for Talker {
 
     /// Calculates the root with at most 60 iterations of Newton's method, which begins at the start value.
     fn calculate(&mut self, _: f64) {
-        let rounds = (0..60).try_fold(self.guess, |root, _| {
-            let next = 0.5 * (root + self.radicand / root);
+        let rounds = (0..60).try_fold(self.root, |root, _| {
+            let next = 0.5 * (root + self.square / root);
             next.is_finite().then_some(next)
         });
-        self.root = rounds.unwrap_or(self.guess);
+        self.found = rounds.unwrap_or(self.root);
     }
 
     fn log(&mut self) -> Option<&mut Log> {
