@@ -355,11 +355,15 @@ def test_a_motor_at_its_end_stops_the_gripper(visit: Any) -> None:
 
 
 def test_numbers_are_as_large_as_a_finger(visit: Any) -> None:
-    """On a touch screen, a number can be grabbed 21 px above and below its middle."""
+    """On a touch screen, a number can be grabbed 21 px above and below its middle, in any font, and covers no button."""
     page = visit(viewport=PHONE, has_touch=True, is_mobile=True, reduced_motion="reduce")
-    x, y = middle(page.locator(".live-what p.live-chosen .live-dial"))
-    for shift in (-21, 21):
-        assert page.evaluate(f"document.elementFromPoint({x}, {y + shift}).className") == "live-dial"
+    for font in ("", "serif", "monospace"):
+        page.evaluate(f"document.body.style.fontFamily = '{font}'")
+        x, y = middle(page.locator(".live-what p.live-chosen .live-dial"))
+        for shift in (-21, 21):
+            assert page.evaluate(f"document.elementFromPoint({x}, {y + shift}).className") == "live-dial", (font, shift)
+        above = page.locator(".live-steps button", has_text="5. Controller").bounding_box()
+        assert above and above["y"] + above["height"] <= y - 22, font
 
 
 def test_a_run_by_hand_continues(visit: Any) -> None:
