@@ -95,7 +95,7 @@ def for_page(svg: bytes, name: str) -> bytes:
         if element.get("transform", "").startswith(("rotate(0 ", "rotate(-0 ")):
             del element.attrib["transform"]
         _restyle(element)
-    _draw_ticks(root)
+    _draw_marks(root)
     for element in reversed(list(root.iter(f"{SVG}g", f"{SVG}defs", f"{SVG}path"))):
         parent, style = element.getparent(), element.get("style", "")
         if element.tag == f"{SVG}path":
@@ -125,8 +125,8 @@ def _make_unique(element: Any, name: str, used: set[str]) -> None:
 
 
 def _shorter(numbers: str) -> str:
-    """Rounds numbers to a tenth of a point, which is less than a pixel of the page, and removes spaces."""
-    text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.1f}".rstrip("0").rstrip("."), numbers)
+    """Rounds numbers to two decimals, a hundredth of a point, and removes spaces."""
+    text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), numbers)
     text = re.sub(r"-0(?![.\d])", "0", re.sub(r"\s+", " ", text))
     return re.sub(r" ?([A-Za-z]) (?=-?\d)", r"\1", text).strip()
 
@@ -156,19 +156,25 @@ def _restyle(element: Any) -> None:
         element.attrib["style"] = ";".join(f"{key}:{value}" for key, value in rules.items())
 
 
-def _draw_ticks(root: Any) -> None:
-    """Keep the style of markers only in their definition; replace straight markers (ticks) by paths."""
+def _draw_marks(root: Any) -> None:
+    """Replaces the copies of a mark by the lines (ticks) or circles that they are, which takes a third less space. A circle has the style
+    of its group, because all marks of a group are alike. Other marks keep their style only in their definition."""
     defined = {f"#{path.get('id')}": path for path in root.iter(f"{SVG}path") if path.get("id")}
     for use in list(root.iter(f"{SVG}use")):
         path, style = defined[use.get("href")], use.attrib.pop("style", None)
         if style is not None:
             path.attrib["style"] = style
-        line = re.fullmatch(r"M0 0 ?L(\S+ \S+)", path.get("d"))
-        if line is not None:
-            tick = {"d": f"M{use.get('x')} {use.get('y')}l{line[1]}", "style": path.get("style")}
-            use.tag = f"{SVG}path"
-            use.attrib.clear()
-            use.attrib.update(tick)
+        x, y, style = use.get("x"), use.get("y"), path.get("style")
+        if line := re.fullmatch(r"M0 0 ?L(\S+ \S+)", path.get("d")):
+            drawn, attributes = "path", {"d": f"M{x} {y}l{line[1]}", "style": style}
+        elif circle := re.fullmatch(r"M0 ([\d.]+)(?:C[^A-Za-z]+){8}z", path.get("d")):
+            drawn, attributes = "circle", {"cx": x, "cy": y, "r": circle[1]}
+            use.getparent().attrib["style"] = style
+        else:
+            continue
+        use.tag = f"{SVG}{drawn}"
+        use.attrib.clear()
+        use.attrib.update(attributes)
     still_used = {use.get("href") for use in root.iter(f"{SVG}use")}
     for href, path in defined.items():
         if href not in still_used:
@@ -189,7 +195,9 @@ def _join_paths(root: Any) -> None:
 
 
 def _packed(path: str) -> str:
-    """Removes spaces before a minus and zeros before a decimal point, which SVG does not need."""
+    """Removes spaces before a minus and zeros before a decimal point, which SVG does not need. Writes `v` and `h` for vertical and
+    horizontal lines."""
+    path = re.sub(r"l0 (\S+?)(?=M|$)", r"v\1", re.sub(r"l(\S+) 0(?=M|$)", r"h\1", path))
     return re.sub(r"(?<![\d.])0(?=\.\d)", "", re.sub(r" (?=-)", "", path))
 
 
@@ -201,7 +209,7 @@ def _relative(points: str) -> str:
         return points
     text, drawn, before = "", "", ("0", "0")
     for command, *point in found:
-        numbers = point if command == "M" else [f"{float(b) - float(a):.1f}" for a, b in zip(before, point)]
+        numbers = point if command == "M" else [f"{float(b) - float(a):.2f}" for a, b in zip(before, point)]
         text += f"{'M' if command == 'M' else 'l' if drawn == 'M' else ' '}{' '.join(numbers)}"
         drawn, before = command, (point[0], point[1])
     return _shorter(text)
