@@ -1,6 +1,6 @@
-//! Rules, which are read from RULES.md, so that the program and its users read the same text. The page begins with a table of the
-//! topics. Each section is a rule: its heading is the name, and its text has the requirement and, for FMI 2.0 and FMI 3.0, the
-//! severity and the section of the standard.
+//! Rules, which are read from RULES.md, so that the program and its users read the same text. The page has a table of the topics and a
+//! table of the rules. A row of the latter has the name of a rule, its requirement and, for FMI 2.0 and FMI 3.0, the severity and the
+//! section of the standard. A sentence of the standard may follow the requirement, after a line break.
 
 use crate::finding::{Finding, Severity};
 use fmi_abi::Standard;
@@ -30,37 +30,59 @@ pub type Observation = (&'static str, String);
 /// Page with all rules.
 const PAGE: &str = include_str!("../RULES.md");
 
+/// Row of the table of rules.
 struct Rule {
     /// Topic, a dot, and the name within the topic.
     name: &'static str,
-    /// Requirement, severities and, for some rules, a sentence of the standard.
-    text: &'static str,
+    requirement: &'static str,
+    /// Sentence of the standard with its section, if the page has one.
+    quotation: Option<&'static str>,
+    /// For FMI 2.0 and FMI 3.0, the severity and the section, such as `note, 2.1.5`, or `note, not in the standard`.
+    judgements: [&'static str; 2],
 }
 
 impl Rule {
-    /// Returns the requirement in a sentence.
-    fn requirement(&self) -> &'static str {
-        self.text.lines().next().unwrap_or_default()
-    }
-
     /// Returns the severity, and the section of the standard with its edition; the section is empty if the rule is not part of
     /// the standard.
-    fn severity(&self, standard: Standard) -> Option<(Severity, &'static str)> {
-        let mut lines = self.text.lines().filter_map(|line| line.strip_prefix("* "));
-        let line = lines.nth(usize::from(standard == Standard::Fmi3))?;
-        let (name, section) = match line.strip_suffix(", not in the standard") {
-            Some(rest) => (rest.split_once(": ")?.1, ""),
-            None => line.split_once(" in ")?,
+    fn severity(&self, standard: Standard) -> Option<(Severity, String)> {
+        let (name, section) = self.judgements[standard as usize].split_once(", ")?;
+        let section = match (section, standard) {
+            ("not in the standard", _) => String::new(),
+            (section, Standard::Fmi2) => format!("FMI 2.0.5 section {section}"),
+            (section, Standard::Fmi3) => format!("FMI 3.0.2 section {section}"),
         };
         let severities = [Severity::Note, Severity::Fragile, Severity::Violation];
         Some((severities.into_iter().find(|severity| severity.name() == name)?, section))
+    }
+
+    /// Returns the rule as text, in which the rule has this name.
+    fn text(&self, name: &str) -> String {
+        let judgement = |standard: Standard| match self.severity(standard).unwrap_or_default() {
+            (severity, section) if section.is_empty() => {
+                format!("* {standard}: {}, not in the standard\n", severity.name())
+            }
+            (severity, section) => format!("* {} in {section}\n", severity.name()),
+        };
+        let judgements = [Standard::Fmi2, Standard::Fmi3].map(judgement).concat();
+        let quotation = self.quotation.map_or(String::new(), |quotation| format!("\n> {quotation}\n"));
+        format!("## {name}\n\n{}\n\n{judgements}{quotation}", self.requirement)
     }
 }
 
 /// Returns all rules in the order of the page.
 fn rules() -> impl Iterator<Item = Rule> {
-    let sections = PAGE.split("\n## ").skip(1).filter_map(|section| section.split_once("\n\n"));
-    sections.map(|(name, text)| Rule { name, text })
+    PAGE.lines().filter_map(|line| {
+        let cells: Vec<&str> = line.strip_prefix("| `")?.strip_suffix(" |")?.split(" | ").collect();
+        let [name, requirement, ref judgements @ ..] = cells[..] else { return None };
+        let name = name.trim_end_matches('`');
+        let (requirement, quotation) = match requirement.split_once("<br>") {
+            Some((requirement, quotation)) => (requirement, Some(quotation)),
+            None => (requirement, None),
+        };
+        // The names of topics, which are in another table, have no dot.
+        let judgements = judgements.try_into().ok().filter(|_| name.contains('.'))?;
+        Some(Rule { name, requirement, quotation, judgements })
+    })
 }
 
 /// Returns the rule of this name. For the end of a process (`crash`, `exit`, `hang`), this is the rule of the call sequence (for
@@ -82,8 +104,8 @@ pub fn is_known(name: &str) -> bool {
 /// Returns the text of a rule, or of all rules; `None` if there is no such rule.
 pub fn explain(name: &str) -> Option<String> {
     match name {
-        "all" => Some(PAGE.to_owned()),
-        name => find(name).map(|rule| format!("## {name}\n\n{}", rule.text)),
+        "all" => Some(rules().map(|rule| rule.text(rule.name)).collect::<Vec<_>>().join("\n")),
+        name => find(name).map(|rule| rule.text(name)),
     }
 }
 
@@ -97,8 +119,8 @@ pub fn broken(standard: Standard, name: &str, observed: String) -> Finding {
     Finding {
         name: name.to_owned(),
         severity,
-        section: section.to_owned(),
-        requirement: rule.requirement().to_owned(),
+        section,
+        requirement: rule.requirement.to_owned(),
         observed,
         ..Finding::default()
     }
@@ -117,15 +139,14 @@ mod tests {
             let topic = rule.name.split('.').next().unwrap_or_default();
             assert!(["*", "arrays"].contains(&topic) || TOPICS.contains(&topic), "{}", rule.name);
             let complete = [Fmi2, Fmi3].iter().all(|standard| rule.severity(*standard).is_some());
-            assert!(complete && rule.requirement().ends_with('.'), "{}", rule.name);
+            assert!(complete && rule.requirement.ends_with('.'), "{}", rule.name);
         }
     }
 
     #[test]
     fn the_pages_list_every_topic() {
-        let (before, _) = super::PAGE.split_once("\n## ").expect("rules");
-        let rows = before.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
-        let mut listed: Vec<&str> = rows.collect();
+        let rows = super::PAGE.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+        let mut listed: Vec<&str> = rows.filter(|name| !name.contains('.')).collect();
         let mut topics = TOPICS.to_vec();
         listed.sort_unstable();
         topics.sort_unstable();
@@ -156,13 +177,19 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_is_explained_by_its_section() {
+    fn a_rule_is_explained_by_its_row() {
         let text = explain("states.crash").expect("a rule");
         assert!(
             text.starts_with("## states.crash\n\nA call that") && text.ends_with("section 2.2.4\n"),
             "{text}"
         );
         assert!(explain("states.nothing").is_none());
+        let text = explain("states.twice").expect("a rule");
+        assert!(
+            text.ends_with("\n\n> FMI 2.0.5 section 2.1.8: “The FMUstate copy still exists.”\n"),
+            "{text}"
+        );
+        assert!(explain("all").is_some_and(|all| all.contains(&text)));
     }
 
     /// Checks that the sources of the checks, and the other sources that name rules, name only rules that exist.
