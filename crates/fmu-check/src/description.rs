@@ -200,9 +200,39 @@ impl Description {
         self.derivatives.iter().filter_map(|unknown| self.variables[unknown.variable].derivative_of).collect()
     }
 
-    /// Returns the number of elements of the state vector; `None` if a size is unknown.
-    pub fn states_count(&self) -> Option<usize> {
-        self.derivatives.iter().map(|unknown| self.variables[unknown.variable].size).sum()
+    /// Returns the number of elements of the state vector; 0 if a size is unknown.
+    pub fn states_count(&self) -> usize {
+        let sizes = self.derivatives.iter().map(|unknown| self.variables[unknown.variable].size);
+        sizes.sum::<Option<usize>>().unwrap_or(0)
+    }
+
+    /// Returns the number of event indicators; 0 if it is unknown.
+    pub fn indicators_count(&self) -> usize {
+        self.event_indicators.unwrap_or(0)
+    }
+
+    /// Returns the independent variable, if there is one.
+    pub fn independent(&self) -> Option<usize> {
+        self.variables.iter().position(|variable| variable.causality == Causality::Independent)
+    }
+
+    /// Returns whether a variable is a continuous floating-point number that is not clocked.
+    pub fn is_continuous(&self, index: usize) -> bool {
+        let variable = &self.variables[index];
+        variable.is_float() && variable.variability == Variability::Continuous && !variable.clocked
+    }
+
+    /// Returns the names of the elements of these variables. The name of an element of an array has its index, counted from 1.
+    pub fn element_names(&self, indices: &[usize]) -> Vec<String> {
+        let names = |index: &usize| {
+            let variable = &self.variables[*index];
+            let count = variable.size.unwrap_or(1);
+            (1..=count).map(move |element| match count {
+                1 => variable.name.clone(),
+                _ => format!("{}[{element}]", variable.name),
+            })
+        };
+        indices.iter().flat_map(names).collect()
     }
 }
 

@@ -49,6 +49,16 @@ pub fn fails(sequence: &CallSequence, ids: Vec<u32>) -> Box<dyn Criterion> {
     Box::new(move |run: &Run| failure(&sequence, run, &ids))
 }
 
+/// Returns a criterion that is violated only if none of these calls fails.
+pub fn unless_fails(
+    sequence: &CallSequence,
+    ids: Vec<u32>,
+    criterion: Box<dyn Criterion>,
+) -> Box<dyn Criterion> {
+    let fails = fails(sequence, ids);
+    Box::new(move |run: &Run| fails(run).is_none().then(|| criterion(run))?)
+}
+
 /// Whether the calls of a finding show it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -121,8 +131,13 @@ impl Finding {
 
     /// Returns the topic of the rule.
     pub fn topic(&self) -> &str {
-        self.name.split('.').next().unwrap_or_default()
+        topic_of(&self.name)
     }
+}
+
+/// Returns the topic of a rule; of a topic, returns the topic itself.
+pub fn topic_of(name: &str) -> &str {
+    name.split('.').next().unwrap_or_default()
 }
 
 /// Returns a description of the end of a process before its last step returned; `None` if the last step returned.

@@ -201,10 +201,9 @@ mod tests {
         let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description, &trajectory, &[0]);
         writer.write(0, WHOLE);
-        let mut thread = Writer { next: writer.next, ..Writer::new(&description, &trajectory, &[0]) };
+        let mut thread = writer.thread();
         thread.write(1, WHOLE);
-        writer.next = thread.next;
-        writer.add(Step::Parallel(vec![thread.sequence]));
+        writer.join(vec![thread]);
         let parallel = |sequence: &CallSequence| {
             matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
         };

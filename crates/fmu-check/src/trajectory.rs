@@ -163,20 +163,11 @@ struct Reached {
 /// Executes the trajectory and then `point`. If the FMU reports an event there, sets `point.event` and starts again. Returns
 /// `None` if a call fails after at least three points.
 fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
-    let count = checker.description.states_count().unwrap_or(0);
-    let indicators = checker.description.event_indicators.unwrap_or(0);
     loop {
         let mut writer = checker.writer(trajectory);
         let before = writer.write(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let here = writer.point(0, point);
-        let vectors = [
-            ("GetContinuousStates", count),
-            (writer.derivatives_name(), count),
-            ("GetEventIndicators", indicators),
-        ];
-        let read =
-            |(name, count)| (count > 0 && !trajectory.is_stepped()).then(|| writer.vector(0, name, count));
-        let vectors = vectors.map(read);
+        let vectors = if trajectory.is_stepped() { [None; 3] } else { writer.vectors(0) };
         let run = checker.execute(&writer.sequence)?;
         made(checker, &run, &writer, before[0])?;
         if let Some(why) = failure(&writer.sequence, &run, &[&before[1..], &here].concat()) {
@@ -229,7 +220,7 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
 /// then every twentieth point and all points with events, at most 21 points.
 fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
     let description = &checker.description;
-    let (count, range) = (description.states_count().unwrap_or(0), range(description));
+    let (count, range) = (description.states_count(), range(description));
     let small = match count {
         0 => range / 10.0,
         _ => (range / 500.0).min(description.step_size.unwrap_or(f64::INFINITY)),

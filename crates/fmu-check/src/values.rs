@@ -73,15 +73,13 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
 
 /// Returns values for at most 1000 continuous inputs: their start values, changed with `near` by the fraction `by`.
 pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
-    let is_continuous = |(_, variable): &(usize, &Variable)| {
+    let is_wanted = |(index, variable): &(usize, &Variable)| {
         variable.causality == Causality::Input
-            && variable.is_float()
-            && variable.variability == Variability::Continuous
-            && !variable.clocked
+            && description.is_continuous(*index)
             && !variable.once_per_instant
             && variable.size == Some(variable.starts_count())
     };
-    let inputs = description.variables.iter().enumerate().filter(is_continuous).take(1000);
+    let inputs = description.variables.iter().enumerate().filter(is_wanted).take(1000);
     let value = |(index, variable): (usize, &Variable)| {
         let numbers = variable.starts().into_iter().map(|start| near(variable, start, by));
         (index, Values::new(description.kind(index), numbers))

@@ -6,8 +6,8 @@ use crate::checker::Checker;
 use crate::description::{DependencyKind, Description, Unknown};
 use crate::values::{near, other_values};
 use crate::writer::Part::{Begin, Enter, Make};
-use crate::writer::{Read, Trajectory, Writer, value_of};
-use fmi_abi::{Causality, Variability};
+use crate::writer::{Read, Trajectory, Writer, number_of, value_of};
+use fmi_abi::Causality;
 use std::collections::HashSet;
 
 /// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown
@@ -103,24 +103,45 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let (knowns, states) = continuous_knowns(checker, trajectory);
     let (values, vector) = middle_values(checker, trajectory, &knowns, &states, &[])?;
     for (known, value) in knowns.into_iter().zip(values) {
-        let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
-        if unknowns.is_empty() || value.is_empty() {
+        if value.is_empty() {
             continue;
         }
         let variable = &checker.description.variables[known];
         let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-        let (mut writer, mut perturbed) = (checker.writer(trajectory), Vec::new());
-        simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
-            perturbed.push(Perturbed::write(writer, &unknowns, |writer, which| {
-                set_known(writer, &states, &vector, known, [&value, &other][which]);
-            }));
-        });
-        let description = checker.description.clone();
-        checker.check("dependencies.missing", writer.sequence, move |run| {
-            perturbed.iter().find_map(|perturbed| perturbed.dependency(run, &description, &unknowns, known))
+        missing_of(checker, trajectory, known, false, &|writer, which| {
+            set_known(writer, &states, &vector, known, [&value, &other][which]);
         })?;
     }
     discrete(checker, trajectory)
+}
+
+/// Checks the dependencies on one known, which `set` sets to a first value if its argument is 0, and to another value if it is 1. Sets it in
+/// Event Mode if `in_event` is true.
+fn missing_of(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    known: usize,
+    in_event: bool,
+    set: &dyn Fn(&mut Writer, usize),
+) -> anyhow::Result<()> {
+    let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
+    if unknowns.is_empty() {
+        return Ok(());
+    }
+    let (mut writer, mut perturbed) = (checker.writer(trajectory), Vec::new());
+    simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
+        if in_event {
+            writer.call(0, "EnterEventMode", vec![]);
+        }
+        perturbed.push(Perturbed::write(writer, &unknowns, set));
+        if in_event {
+            writer.leave_event(0);
+        }
+    });
+    let description = checker.description.clone();
+    checker.check("dependencies.missing", writer.sequence, move |run| {
+        perturbed.iter().find_map(|perturbed| perturbed.dependency(run, &description, &unknowns, known))
+    })
 }
 
 /// Returns two lists: at most 60 continuous knowns, which are inputs and, in Model Exchange, states; and all states, even those
@@ -128,15 +149,13 @@ pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
 /// vector.
 fn continuous_knowns(checker: &Checker, trajectory: &Trajectory) -> (Vec<usize>, Vec<usize>) {
     let description = &checker.description;
-    let scalar = !trajectory.is_stepped() && description.states_count() == Some(description.states().len());
+    let scalar = !trajectory.is_stepped() && description.states_count() == description.states().len();
     let states = if scalar { description.states() } else { Vec::new() };
     let inputs = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
         variable.causality == Causality::Input
-            && variable.is_float()
-            && variable.variability == Variability::Continuous
+            && description.is_continuous(*index)
             && !variable.once_per_instant
-            && !variable.clocked
     });
     (inputs.chain(states.iter().copied()).take(checker.at_most(60)).collect(), states)
 }
@@ -147,31 +166,14 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let inputs = (0..description.variables.len()).filter(|index| {
         let variable = &description.variables[*index];
-        let continuous = variable.is_float() && variable.variability == Variability::Continuous;
-        let excluded = continuous || variable.once_per_instant || variable.clocked;
+        let excluded = description.is_continuous(*index) || variable.once_per_instant || variable.clocked;
         variable.causality == Causality::Input && !excluded && description.aliases(*index).count() == 1
     });
     for known in inputs.take(checker.at_most(60)) {
-        let unknowns = undeclared(checker, unknowns(checker, trajectory), known);
-        let Some(values) = start_and_other_values(description, known).filter(|_| !unknowns.is_empty()) else {
-            continue;
-        };
-        let (mut writer, mut perturbed) = (checker.writer(trajectory), Vec::new());
-        let events = !trajectory.is_stepped() || description.event_mode();
-        simulate_with(&mut writer, trajectory, &tried_points(checker, trajectory), |writer| {
-            if events {
-                writer.call(0, "EnterEventMode", vec![]);
-            }
-            perturbed.push(Perturbed::write(writer, &unknowns, |writer, which| {
-                writer.set(0, &[(known, values[which].clone())]);
-            }));
-            if events {
-                writer.leave_event(0);
-            }
-        });
-        let description = checker.description.clone();
-        checker.check("dependencies.missing", writer.sequence, move |run| {
-            perturbed.iter().find_map(|perturbed| perturbed.dependency(run, &description, &unknowns, known))
+        let Some(values) = start_and_other_values(description, known) else { continue };
+        let in_event = !trajectory.is_stepped() || description.event_mode();
+        missing_of(checker, trajectory, known, in_event, &|writer, which| {
+            writer.set(0, &[(known, values[which].clone())]);
         })?;
     }
     Ok(())
@@ -239,7 +241,7 @@ impl Line {
     /// Returns the factor of the known in both intervals, and the size of their rounding errors. Returns `None` if a value was not read or
     /// is not finite.
     fn factors(&self, run: &Run, unknown: usize) -> Option<([f64; 2], f64)> {
-        let value = |which: usize| value_of(run, &self.reads[which], unknown)?.numbers().first().copied();
+        let value = |which: usize| number_of(run, &self.reads[which], unknown);
         let values = [value(0)?, value(1)?, value(2)?];
         let size = values.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         let factors = [values[1] - values[0], values[2] - values[1]].map(|change| change / self.distance);

@@ -4,7 +4,7 @@ use crate::call_sequence::{Arg, Kind, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::writer::{Part, Trajectory, Writer, value_of};
-use fmi_abi::{BaseType, Causality, Interface, Variability};
+use fmi_abi::{BaseType, Causality, Interface};
 
 /// Maximum number of knowns with respect to which derivatives are compared with differences.
 pub const MOST_KNOWNS: usize = 400;
@@ -12,10 +12,7 @@ pub const MOST_KNOWNS: usize = 400;
 /// Returns whether a variable is a continuous scalar with double precision.
 pub fn is_continuous_scalar(description: &Description, index: usize) -> bool {
     let variable = &description.variables[index];
-    variable.base == Some(BaseType::Real)
-        && variable.variability == Variability::Continuous
-        && variable.size == Some(1)
-        && !variable.clocked
+    variable.base == Some(BaseType::Real) && variable.size == Some(1) && description.is_continuous(index)
 }
 
 /// Returns at most 200 continuous scalar outputs and, in Model Exchange, state derivatives.
@@ -56,9 +53,8 @@ pub fn to_middle(trajectory: &Trajectory) -> [Part; 2] {
 
 /// Writes the first half of the simulation with these parameters.
 pub fn write_to_middle(writer: &mut Writer, parameters: &[(usize, Values)]) {
-    writer.write(0, &[Part::Make]);
-    writer.set(0, parameters);
-    writer.write(0, &[Part::Enter, Part::Leave, Part::Points(writer.trajectory.points.len() / 2)]);
+    writer.begin_with(0, parameters);
+    writer.write(0, &[Part::Points(writer.trajectory.points.len() / 2)]);
 }
 
 /// Returns whether the FMU declares that it provides directional derivatives, and whether it declares adjoint derivatives.

@@ -10,7 +10,7 @@ use crate::checker::Checker;
 use crate::description::{Description, Unknown, Variable};
 use crate::trajectory::step_size;
 use crate::values::other_numbers;
-use crate::writer::{Part, Read, Trajectory, Writer, value_of};
+use crate::writer::{Part, Read, Trajectory, Writer, number_of};
 use fmi_abi::{BaseType, Causality};
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub fn differences(
 ) -> anyhow::Result<()> {
     let description = &checker.description;
     let states = if trajectory.is_stepped() { Vec::new() } else { description.states() };
-    if !trajectory.is_stepped() && states.len() != description.states_count().unwrap_or(0) {
+    if !trajectory.is_stepped() && states.len() != description.states_count() {
         return Ok(());
     }
     let (values, vector) = middle_values(checker, trajectory, knowns, &states, parameters)?;
@@ -64,16 +64,8 @@ pub fn differences(
             let reference = description.variables[*known].reference;
             let derivatives =
                 request_column(&mut writer, &references(description, rows), reference, is_directional);
-            all.push(Differences {
-                unknowns: rows.clone(),
-                itself: description.aliases(*known).collect(),
-                names: names(description, rows),
-                known: description.variables[*known].name.clone(),
-                may_react_later: trajectory.is_stepped(),
-                step: *step,
-                derivatives,
-                reads,
-            });
+            let differences = Differences::new(description, rows.clone(), *known, *step, derivatives, reads);
+            all.push(Differences { may_react_later: trajectory.is_stepped(), ..differences });
         }
         let all = Arc::new(all);
         let precise = Arc::clone(&all);
@@ -172,19 +164,9 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         });
         let derivatives =
             request_column(&mut writer, &references(description, &rows), variable.reference, has_directional);
-        let differences = Differences {
-            itself: description.aliases(known).collect(),
-            names: names(description, &rows)
-                .into_iter()
-                .map(|name| format!("{name} in Initialization Mode"))
-                .collect(),
-            unknowns: rows,
-            known: variable.name.clone(),
-            may_react_later: true,
-            step,
-            derivatives,
-            reads,
-        };
+        let mut differences = Differences::new(description, rows, known, step, derivatives, reads);
+        differences.names.iter_mut().for_each(|name| name.push_str(" in Initialization Mode"));
+        differences.may_react_later = true;
         let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
         checker.check("derivatives.directional", writer.sequence, criterion)?;
     }
@@ -194,8 +176,7 @@ pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
 /// Checks the derivatives with respect to time in Model Exchange, in the middle of a simulation.
 pub fn by_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let is_time = |index: &usize| description.variables[*index].causality == Causality::Independent;
-    let Some(time) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
+    let Some(time) = description.independent() else { return Ok(()) };
     let unknowns = unknowns(description, trajectory.interface);
     let listed = description.outputs.iter().chain(&description.derivatives);
     let rows = dependents(description, listed, time, &unknowns);
@@ -213,20 +194,11 @@ pub fn by_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     };
     // Time must not go back.
     let [low, lower, center] = [-1.0, -0.5, 0.0].map(|times| read_at(&mut writer, times));
-    let variable = &description.variables[time];
-    let derivatives = request_column(&mut writer, &references(description, &rows), variable.reference, true);
+    let reference = description.variables[time].reference;
+    let derivatives = request_column(&mut writer, &references(description, &rows), reference, true);
     let [higher, high] = [0.5, 1.0].map(|times| read_at(&mut writer, times));
     let reads = [high, low, higher, lower, center];
-    let differences = Differences {
-        itself: vec![time],
-        names: names(description, &rows),
-        unknowns: rows,
-        known: variable.name.clone(),
-        may_react_later: false,
-        step,
-        derivatives,
-        reads,
-    };
+    let differences = Differences::new(description, rows, time, step, derivatives, reads);
     let criterion = move |run: &Run| differences.evaluate(run, 1e-4);
     checker.check("derivatives.directional", writer.sequence, criterion)
 }
@@ -254,12 +226,7 @@ pub fn after_events(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
 /// Requests the derivatives of all unknowns with respect to one known, by one directional derivative or by an adjoint derivative for each
 /// unknown. Because the FMU rejects the directional derivative if it does not provide that of one unknown, also requests a few one by one.
 /// Returns, for each unknown, the numbers of the calls and the index in the result of each.
-fn request_column(
-    writer: &mut Writer,
-    unknowns: &[u32],
-    known: u32,
-    is_directional: bool,
-) -> Vec<Vec<(u32, usize)>> {
+fn request_column(writer: &mut Writer, unknowns: &[u32], known: u32, is_directional: bool) -> Requests {
     let name = if is_directional { "GetDirectionalDerivative" } else { "GetAdjointDerivative" };
     let count = unknowns.len();
     let column = is_directional.then(|| request_derivatives(writer, name, unknowns, &[known], &[1.0], count));
@@ -283,13 +250,36 @@ struct Differences {
     /// Whether unknowns may stay unchanged until a later call, such as the next step of Co-Simulation.
     may_react_later: bool,
     step: f64,
-    /// For each unknown, the numbers of the calls for its derivative, and the index in the result of each call.
-    derivatives: Vec<Vec<(u32, usize)>>,
+    derivatives: Requests,
     /// Reads of the unknowns with +step, -step, +step/2, -step/2 and 0 added to the known.
     reads: [Vec<Read>; 5],
 }
 
+/// For each unknown, the numbers of the calls for its derivative, and the index in the result of each call.
+type Requests = Vec<Vec<(u32, usize)>>;
+
 impl Differences {
+    /// Makes the differences of unknowns that may not stay unchanged.
+    fn new(
+        description: &Description,
+        unknowns: Vec<usize>,
+        known: usize,
+        step: f64,
+        derivatives: Requests,
+        reads: [Vec<Read>; 5],
+    ) -> Self {
+        Self {
+            names: names(description, &unknowns),
+            unknowns,
+            known: description.variables[known].name.clone(),
+            itself: description.aliases(known).collect(),
+            may_react_later: false,
+            step,
+            derivatives,
+            reads,
+        }
+    }
+
     /// Describes the first derivative that differs from the central difference. Allows a relative difference of `tolerance`, and the error
     /// of the central difference, which is estimated by comparing two step sizes.
     fn evaluate(&self, run: &Run, tolerance: f64) -> Option<String> {
@@ -297,10 +287,8 @@ impl Differences {
             if self.itself.contains(unknown) {
                 continue;
             }
-            let number = |reads: &Vec<Read>| -> Option<f64> {
-                let value = value_of(run, reads, *unknown)?.numbers().first().copied();
-                value.filter(|number| number.is_finite())
-            };
+            let number =
+                |reads: &Vec<Read>| number_of(run, reads, *unknown).filter(|number: &f64| number.is_finite());
             let Some(values) = self.reads.iter().map(number).collect::<Option<Vec<f64>>>() else { continue };
             let derivative = |(id, index): &(u32, usize)| numbers_if_ok(run, *id)?.get(*index).copied();
             let calls = &self.derivatives[row];

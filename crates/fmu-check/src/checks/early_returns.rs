@@ -3,19 +3,14 @@
 use crate::call_sequence::Run;
 use crate::checker::Checker;
 use crate::values::is_other_time;
-use crate::writer::{Read, Trajectory, Writer, value_of};
-use fmi_abi::Causality;
+use crate::writer::{Read, Trajectory, Writer, number_of};
 use std::sync::Arc;
 
 /// Checks steps with `eventModeUsed`, with `earlyReturnAllowed` and with both. A step may report an event or return early only if the
 /// importer has agreed to it at the instantiation. The time that a step returns must be the value of the independent variable. A step
 /// that stops at an event before its requested end must report an early return.
 pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let time = checker
-        .description
-        .variables
-        .iter()
-        .position(|variable| variable.causality == Causality::Independent);
+    let time = checker.description.independent();
     let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
     for (event_mode, early_return) in [(true, true), (true, false), (false, true)] {
         // An FMU with clocks needs Event Mode, and one that lacks Event Mode cannot use it.
@@ -36,7 +31,7 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
                         "a step reports eventHandlingNeeded although eventModeUsed is false".to_owned(),
                     );
                 }
-                let now = *value_of(run, &step.values, time?)?.numbers().first()?;
+                let now = number_of(run, &step.values, time?)?;
                 let end = step.end;
                 is_other_time(reached, now).then(|| {
                     format!("a step to {end:?} returned the lastSuccessfulTime {reached:?}, but the independent variable is {now:?}")

@@ -1,13 +1,12 @@
 //! Checks that Model Exchange announces the events that change its discrete states, and handles each event once.
 
 use super::integration::integrate_with_events;
-use crate::call_sequence::{Integration, Run, Step, Values};
+use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::event;
 use crate::trajectory::step_size;
 use crate::values::inputs_by;
-use crate::writer::Part::{Enter, Leave, Make};
 use crate::writer::{Point, Read, Trajectory, Writer, value_of};
 use fmi_abi::{Causality, Variability};
 
@@ -48,23 +47,19 @@ struct IntervalEnd {
 /// do so at any time.
 pub fn unannounced(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let states = description.states_count().unwrap_or(0);
-    let indicators = description.event_indicators.unwrap_or(0);
+    let indicators = description.indicators_count();
     let variables = discrete(checker);
     if indicators == 0 || variables.is_empty() {
         return Ok(());
     }
     let size = step_size(description);
     let mut writer = Writer::new(description, trajectory, &variables);
-    writer.write(0, &[Make]);
-    writer.set(0, &inputs_by(description, 0.5));
-    writer.write(0, &[Enter, Leave]);
+    writer.begin_with(0, &inputs_by(description, 0.5));
     let (mut ends, mut begin) = (Vec::new(), description.start_time);
     for number in 0..INTERVALS {
         // Events are unlikely at these ends of intervals, because the fraction is unusual.
         let end = description.start_time + (number as f64 + 0.381_966) * size;
-        let how = Integration { begin, end, steps: 4, euler: states == 0, states, indicators };
-        let integration = writer.add(Step::Integrate(0, how));
+        let integration = writer.integrate(0, begin, end);
         let before = (writer.vector(0, "GetEventIndicators", indicators), writer.read(0));
         let update = writer.event(0)[1];
         let after = (writer.vector(0, "GetEventIndicators", indicators), writer.read(0));

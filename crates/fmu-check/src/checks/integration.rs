@@ -1,10 +1,9 @@
 //! Integrates Model Exchange with larger inputs, which cause more events than the usual simulation.
 
-use crate::call_sequence::{Integration, Step, Values};
+use crate::call_sequence::Values;
 use crate::checker::Checker;
 use crate::trajectory::step_size;
 use crate::values::inputs_by;
-use crate::writer::Part::{Enter, Leave, Make};
 use crate::writer::{Point, Trajectory};
 
 /// Integration, and the points at which checks compare values.
@@ -72,17 +71,13 @@ struct Reached {
 /// Integrates intervals that end at these times. Returns the results of the intervals before the first one that fails.
 fn integrate(checker: &Checker, trajectory: &Trajectory, times: &[f64]) -> anyhow::Result<Vec<Reached>> {
     let description = &checker.description;
-    let states = description.states_count().unwrap_or(0);
-    let indicators = description.event_indicators.unwrap_or(0);
+    let states = description.states_count();
     let mut writer = checker.writer(trajectory);
-    writer.write(0, &[Make]);
-    writer.set(0, &inputs_by(description, 0.5));
-    writer.write(0, &[Enter, Leave]);
+    writer.begin_with(0, &inputs_by(description, 0.5));
     let mut begin = description.start_time;
     let mut calls = Vec::new();
     for end in times {
-        let how = Integration { begin, end: *end, steps: 4, euler: states == 0, states, indicators };
-        let id = writer.add(Step::Integrate(0, how));
+        let id = writer.integrate(0, begin, *end);
         calls.push((id, (states > 0).then(|| writer.vector(0, "GetContinuousStates", states))));
         begin = *end;
     }

@@ -1,12 +1,11 @@
 //! Compares Co-Simulation with Model Exchange, if an FMU offers both.
 
-use crate::call_sequence::{Integration, Run, Step, Values};
+use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Criterion;
 use crate::trajectory::{range, step_size};
 use crate::values::near;
-use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 use fmi_abi::{Causality, Variability};
 
@@ -55,12 +54,11 @@ pub fn compare(checker: &Checker) -> anyhow::Result<()> {
     let is_input = |index: &usize| {
         let variable = &description.variables[*index];
         variable.causality == Causality::Input
-            && variable.is_float()
-            && variable.variability == Variability::Continuous
+            && description.is_continuous(*index)
             && variable.size == Some(1)
             && !variable.start.is_empty()
     };
-    let inputs = (0..description.variables.len()).filter(is_input).take(checker.at_most(4));
+    let inputs = (0..description.variables.len()).filter(is_input).take(4);
     for input in std::iter::once(None).chain(inputs.map(Some)) {
         with_input(checker, [stepped, integrated], input)?;
     }
@@ -84,24 +82,19 @@ fn with_input(
     // Number of integration steps, or `None` for Co-Simulation.
     let integration_steps = [None, None, Some(INTEGRATION_STEPS), Some(2 * INTEGRATION_STEPS), Some(1)];
     for (instance, steps) in integration_steps.into_iter().enumerate() {
-        let is_stepped = steps.is_none();
-        let mut writer = Writer::new(description, if is_stepped { stepped } else { integrated }, &outputs);
-        writer.next = all.next;
-        writer.write(instance, &[Make]);
-        if let Some(input) = input.filter(|_| instance != AT_START) {
+        all.trajectory = if steps.is_none() { stepped } else { integrated };
+        let changed = input.filter(|_| instance != AT_START).map(|input| {
             let variable = &description.variables[input];
             let value = near(variable, variable.starts().first().copied().unwrap_or_default(), 0.5);
-            writer.set_numbers(instance, input, &[value]);
-        }
-        writer.write(instance, &[Enter, Leave]);
+            (input, Values::new(description.kind(input), [value]))
+        });
+        all.begin_with(instance, changed.as_slice());
         let simulation = match steps {
-            None => in_steps(&mut writer, instance, &times, size),
-            Some(steps) => integrate(&mut writer, instance, &times, steps),
+            None => in_steps(&mut all, instance, &times, size),
+            Some(steps) => integrate(&mut all, instance, &times, steps),
         };
-        writer.write(instance, &[Free]);
+        all.free(instance);
         simulations.push(simulation);
-        all.next = writer.next;
-        all.sequence.extend(writer.sequence);
     }
     checker.check(
         "results.interfaces",
@@ -121,15 +114,12 @@ fn in_steps(writer: &mut Writer, instance: usize, times: &[f64], size: f64) -> S
 
 /// Writes the integrations of Model Exchange from each time to the next. A single step is a step of Euler's method.
 fn integrate(writer: &mut Writer, instance: usize, times: &[f64], steps: usize) -> Simulation {
-    let states = writer.description.states_count().unwrap_or(0);
-    let indicators = writer.description.event_indicators.unwrap_or(0);
-    let mut simulation = Simulation { reads: Vec::new(), integrations: Vec::new() };
-    for pair in times.windows(2) {
-        let how = Integration { begin: pair[0], end: pair[1], steps, euler: steps == 1, states, indicators };
-        simulation.integrations.push(writer.add(Step::Integrate(instance, how)));
-        simulation.reads.push(writer.read(instance));
-    }
-    simulation
+    let interval = |pair: &[f64]| {
+        let id = writer.integrate_in(instance, pair[0], pair[1], steps, steps == 1);
+        (id, writer.read(instance))
+    };
+    let (integrations, reads) = times.windows(2).map(interval).unzip();
+    Simulation { reads, integrations }
 }
 
 /// Run of the simulations.

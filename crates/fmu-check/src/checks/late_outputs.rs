@@ -1,13 +1,12 @@
 //! Checks that outputs after a step have the values at its end, not the values at its beginning.
 
-use crate::call_sequence::{Integration, Run, Step};
+use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::{Description, Variable};
 use crate::trajectory::{range, step_size};
 use crate::values::inputs_by;
-use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
-use fmi_abi::{Causality, Variability};
+use fmi_abi::Causality;
 
 /// Minimum and maximum number of steps.
 const STEPS: [usize; 2] = [8, 24];
@@ -17,11 +16,8 @@ const SIZE: f64 = 0.93;
 
 /// Returns whether a variable is a continuous output or local variable.
 pub fn is_continuous(description: &Description, index: usize) -> bool {
-    let variable = &description.variables[index];
-    variable.is_float()
-        && variable.variability == Variability::Continuous
-        && !variable.clocked
-        && ![Causality::Input, Causality::Independent].contains(&variable.causality)
+    let causality = description.variables[index].causality;
+    description.is_continuous(index) && ![Causality::Input, Causality::Independent].contains(&causality)
 }
 
 /// Returns whether the steps of a simulation may have any size.
@@ -64,21 +60,8 @@ impl Series {
     fn write(writer: &mut Writer, duration: f64, count: usize) -> Self {
         let description = writer.description;
         let size = duration / count as f64;
-        let [constant, changed] = [false, true].map(|changes| {
-            writer.write(0, &[Make]);
-            writer.set(0, &inputs_by(description, 0.5));
-            writer.write(0, &[Enter, Leave]);
-            let mut reads = vec![writer.read(0)];
-            for number in 0..count {
-                if changes && number == count / 2 {
-                    writer.set(0, &inputs_by(description, 0.25));
-                }
-                writer.step(0, description.start_time + number as f64 * size, size);
-                reads.push(writer.read(0));
-            }
-            writer.write(0, &[Free]);
-            reads
-        });
+        let [constant, changed] = [false, true]
+            .map(|changes| write_steps(writer, (size, count), changes.then(|| inputs_by(description, 0.25))));
         Self { constant, changed }
     }
 }
@@ -136,7 +119,7 @@ fn compare_with_integration(
     let mut writer = Writer::new(description, stepped, &outputs);
     let [steps, integrations] = [stepped, integrated].map(|trajectory| {
         writer.trajectory = trajectory;
-        write_usual_steps(&mut writer)
+        write_steps(&mut writer, (step_size(description), STEPS[1]), None)
     });
     let description = description.clone();
     checker.check("dynamics.late-output", writer.sequence, move |run| {
@@ -146,28 +129,24 @@ fn compare_with_integration(
     })
 }
 
-/// Writes a simulation with steps of the usual size. Returns the reads at the start and after each step.
-fn write_usual_steps(writer: &mut Writer) -> Vec<Vec<Read>> {
+/// Writes a simulation with `count` steps of this size, or integrations of the same duration. If there are other inputs, sets them in the
+/// middle. Returns the reads at the start and after each step.
+fn write_steps(
+    writer: &mut Writer,
+    (size, count): (f64, usize),
+    other_inputs: Option<Vec<(usize, Values)>>,
+) -> Vec<Vec<Read>> {
     let description = writer.description;
-    let size = step_size(description);
-    let states = description.states_count().unwrap_or(0);
-    let indicators = description.event_indicators.unwrap_or(0);
-    writer.write(0, &[Make]);
-    writer.set(0, &inputs_by(description, 0.5));
-    writer.write(0, &[Enter, Leave]);
+    writer.begin_with(0, &inputs_by(description, 0.5));
     let mut reads = vec![writer.read(0)];
-    for number in 0..STEPS[1] {
-        let time = |number: usize| description.start_time + number as f64 * size;
-        let (begin, end) = (time(number), time(number + 1));
-        if writer.trajectory.is_stepped() {
-            writer.step(0, begin, size);
-        } else {
-            let integration = Integration { begin, end, steps: 4, euler: states == 0, states, indicators };
-            writer.add(Step::Integrate(0, integration));
+    for number in 0..count {
+        if let Some(inputs) = other_inputs.as_ref().filter(|_| number == count / 2) {
+            writer.set(0, inputs);
         }
+        writer.advance(0, description.start_time, size, number);
         reads.push(writer.read(0));
     }
-    writer.write(0, &[Free]);
+    writer.free(0);
     reads
 }
 

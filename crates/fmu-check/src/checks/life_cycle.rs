@@ -317,7 +317,7 @@ fn event_iteration(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
 /// Checks that an event that changes states reports the change, because importers otherwise continue with the old states, and that the
 /// description declares which states events change, because importers may treat the others as continuous.
 fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let count = checker.description.states_count().unwrap_or(0);
+    let count = checker.description.states_count();
     if count == 0 {
         return Ok(());
     }

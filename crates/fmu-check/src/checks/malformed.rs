@@ -193,13 +193,13 @@ pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
             }
         }
     }
-    let states = description.states_count().unwrap_or(0);
+    let states = description.states_count();
     let vectors = [
         ("GetContinuousStates", states),
         ("GetNominalsOfContinuousStates", states),
         ("SetContinuousStates", states),
         (checker.writer(trajectory).derivatives_name(), states),
-        ("GetEventIndicators", description.event_indicators.unwrap_or(0)),
+        ("GetEventIndicators", description.indicators_count()),
     ];
     for (function, size) in vectors.into_iter().filter(|_| !trajectory.is_stepped()) {
         for count in [size.checked_sub(1), Some(size + 1)].into_iter().flatten() {

@@ -1,14 +1,14 @@
 //! Checks that results do not depend on the process, arguments of the instantiation, other instances, threads, reads or the step size, and
 //! that the FMU returns the right times.
 
-use crate::call_sequence::{Arg, Kind, Make, Numbered, Run, Step};
+use crate::call_sequence::{Arg, Kind, Make, Run, Step};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Criterion, any, status_name};
 use crate::trajectory::steps;
 use crate::values::is_other_time;
 use crate::writer::Part::{Begin, Points, ReadAll, Run as RunFrom};
-use crate::writer::{Part, Point, Read, Trajectory, Writer, access, value_of};
+use crate::writer::{Part, Point, Read, Trajectory, access, number_of, value_of};
 use fmi_abi::Causality;
 
 /// Complete simulation that reads all variables and vectors at every point.
@@ -185,10 +185,9 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     let mut writer = checker.writer(trajectory);
     let single = writer.write(0, COMPLETE).reads;
     writer.free(0);
-    let mut sequences: Vec<Vec<Numbered>> = Vec::new();
-    let mut criteria = Vec::new();
+    let (mut threads, mut criteria) = (Vec::new(), Vec::new());
     for number in 1..=4 {
-        let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
+        let mut thread = threads.last().unwrap_or(&writer).thread();
         // Each thread executes twenty simulations, so that simulations on different threads overlap.
         for _ in 0..20 {
             let reads = thread.write(number, COMPLETE).reads;
@@ -199,10 +198,9 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
             ));
             thread.free(number);
         }
-        writer.next = thread.next;
-        sequences.push(thread.sequence);
+        threads.push(thread);
     }
-    writer.add(Step::Parallel(sequences));
+    writer.join(threads);
     checker.check("results.threads", writer.sequence, any(criteria))
 }
 
@@ -276,8 +274,7 @@ fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64
 /// Checks that the independent variable is the time at the end of each step or, in Model Exchange, at each point.
 pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let is_time = |index: &usize| description.variables[*index].causality == Causality::Independent;
-    let Some(index) = (0..description.variables.len()).find(is_time) else { return Ok(()) };
+    let Some(index) = description.independent() else { return Ok(()) };
     let mut runs = vec![(0.0, trajectory.points.clone())];
     if let (true, Some(first)) = (trajectory.is_stepped(), trajectory.points.first()) {
         // Another start time, which an FMU may reject, and a step size that is unlikely to be a multiple of the solver's step
@@ -307,7 +304,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         }
         checker.check("results.time", writer.sequence, move |run| {
             reads.iter().find_map(|(reads, time, step)| {
-                let value = *value_of(run, reads, index)?.numbers().first()?;
+                let value = number_of(run, reads, index)?;
                 // A step may end early, at the lastSuccessfulTime that it returns (section 4.2.1 of FMI 3.0).
                 let reached = step.and_then(|id| run.outcome(id)?.written.get(3)?.numbers().first().copied());
                 let time = reached.unwrap_or(*time);

@@ -103,7 +103,7 @@ fn is_rounded((set, read): &(f64, f64)) -> bool {
 
 /// Sets and reads the states of Model Exchange. Returns the criterion that they are not rounded; `None` if there are no states.
 fn states(checker: &Checker, trajectory: &Trajectory, writer: &mut Writer) -> Option<Box<dyn Criterion>> {
-    let count = checker.description.states_count().filter(|count| *count > 0)?;
+    let count = Some(checker.description.states_count()).filter(|count| *count > 0)?;
     let point =
         trajectory.points.get(1).filter(|point| !trajectory.is_stepped() && point.states.len() == count)?;
     writer.write(0, &[Begin, Points(2)]);

@@ -5,7 +5,6 @@ use crate::call_sequence::Run;
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::values::inputs_by;
-use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, value_of};
 
 /// Number of small steps that are compared with one step.
@@ -45,21 +44,12 @@ pub fn small_steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     let mut all = Vec::new();
     for size in sizes(usual) {
         let mut after = |steps: usize, size: f64| {
-            writer.write(0, &[Make]);
-            writer.set(0, &inputs_by(description, 0.5));
-            writer.write(0, &[Enter, Leave]);
-            let mut time = description.start_time;
-            for _ in 0..BEFORE {
-                writer.step(0, time, usual);
-                time += usual;
-            }
+            writer.begin_with(0, &inputs_by(description, 0.5));
+            let time = writer.steps(0, description.start_time, usual, BEFORE);
             let before = writer.read(0);
-            for _ in 0..steps {
-                writer.step(0, time, size);
-                time += size;
-            }
+            writer.steps(0, time, size, steps);
             let after = writer.read(0);
-            writer.write(0, &[Free]);
+            writer.free(0);
             (before, after)
         };
         let (before, small) = after(STEPS, size);

@@ -7,7 +7,6 @@ use crate::checker::Checker;
 use crate::description::Description;
 use crate::values::inputs_by;
 use crate::writer::{Read, Trajectory, Writer, value_of};
-use fmi_abi::Variability;
 use std::collections::BTreeSet;
 
 /// Unknowns that a snapshot contains.
@@ -23,6 +22,7 @@ pub struct Unknowns {
 }
 
 /// Calls that read the unknowns at one point.
+#[derive(Clone)]
 pub struct Snapshot {
     reads: Vec<Read>,
     /// Number of the call for each vector, and the number of elements.
@@ -33,13 +33,10 @@ impl Unknowns {
     /// Returns the unknowns of an FMU, with at most 200 variables.
     pub fn new(checker: &Checker, trajectory: &Trajectory) -> Self {
         let description = &checker.description;
-        let is_continuous = |index: &usize| {
-            let variable = &description.variables[*index];
-            variable.is_float() && variable.variability == Variability::Continuous && !variable.clocked
-        };
         let listed = description.outputs.iter().chain(&description.derivatives);
-        let all: BTreeSet<usize> = listed.map(|unknown| unknown.variable).filter(is_continuous).collect();
-        let variables: Vec<usize> = all.into_iter().take(200).collect();
+        let all: BTreeSet<usize> = listed.map(|unknown| unknown.variable).collect();
+        let is_continuous = |index: &usize| description.is_continuous(*index);
+        let variables: Vec<usize> = all.into_iter().filter(is_continuous).take(200).collect();
         let scalar = |index: &usize| description.variables[*index].size == Some(1);
         let offers = ["providesDirectionalDerivative", "providesDirectionalDerivatives"];
         let directional = checker.can(trajectory.interface, &offers).then(|| {
@@ -50,8 +47,8 @@ impl Unknowns {
         });
         Self {
             variables,
-            states: description.states_count().unwrap_or(0),
-            indicators: description.event_indicators.unwrap_or(0),
+            states: description.states_count(),
+            indicators: description.indicators_count(),
             directional: directional.filter(|lists| lists.iter().all(|list| !list.is_empty())),
         }
     }
@@ -80,10 +77,6 @@ impl Unknowns {
         let numbered = |what: &str, count: usize| -> Vec<String> {
             (1..=count).map(|number| format!("{what} {number}")).collect()
         };
-        let variable = |index: &usize| {
-            let of = &description.variables[*index];
-            vec![of.name.clone(); of.size.unwrap_or(1)]
-        };
         let references = self.directional.as_ref().map_or(&[][..], |[unknowns, _]| unknowns);
         let with_reference = |reference: &u32| {
             let of = description.variables.iter().find(|variable| variable.reference == *reference);
@@ -92,7 +85,7 @@ impl Unknowns {
         let mut names = numbered("state derivative", self.states);
         names.extend(numbered("event indicator", self.indicators));
         names.extend(references.iter().map(with_reference));
-        names.extend(self.variables.iter().flat_map(variable));
+        names.extend(description.element_names(&self.variables));
         names
     }
 

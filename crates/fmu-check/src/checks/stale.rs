@@ -2,7 +2,7 @@
 
 use super::integration::{Integrated, integrate_with_events};
 use super::snapshots::{Snapshot, Unknowns};
-use crate::call_sequence::{Arg, Kind, Run, Values};
+use crate::call_sequence::{Arg, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::values::inputs_by;
@@ -13,28 +13,23 @@ use std::sync::Arc;
 /// normal, because FMUs solve algebraic loops by iteration.
 const TOLERANCE: f64 = 1e-3;
 
-/// Snapshots at a point, all at the same time. They have the states and inputs after the event, unless a comment says otherwise.
+/// Two snapshots whose numbers must be equal, and when the first one was read.
+type Pair = (Snapshot, Snapshot, &'static str);
+
+/// Snapshots at a point, all at the same time.
 struct PointSnapshots {
     time: f64,
-    /// In Event Mode, after the last update.
-    in_event: Snapshot,
-    /// After Event Mode.
-    after: Snapshot,
-    /// After the time and the same states were set again.
-    set_again: Snapshot,
-    /// After other states and then the first states were set.
-    set_back: Snapshot,
-    /// With other inputs, before and after the time and the states were set again.
-    other_inputs: [Snapshot; 2],
-    /// After the first inputs were set, before and after the time and the states were set again.
-    first_inputs: [Snapshot; 2],
-    /// With other states, before and after CompletedIntegratorStep.
-    other_states: [Snapshot; 2],
+    /// Pairs of the rule dynamics.stale.
+    after_event: Vec<Pair>,
+    /// Pair of the rule dynamics.event-mode.
+    in_event: [Pair; 1],
+    /// Snapshots with equal time, states and inputs, whose differences are the error of an iterative solver.
+    repeated: [Snapshot; 3],
 }
 
 /// Returns the states after an event at each of the points `at`; they are empty if they were not read.
 fn states_after(checker: &Checker, trajectory: &Trajectory, at: &[usize]) -> anyhow::Result<Vec<Vec<f64>>> {
-    let count = checker.description.states_count().unwrap_or(0);
+    let count = checker.description.states_count();
     let mut writer = checker.writer(trajectory);
     writer.begin(0);
     let mut ids = Vec::new();
@@ -87,24 +82,10 @@ fn depend_on_arguments(
     let compared = Arc::new(Compared { description: Arc::clone(description), unknowns, names, points: all });
     let in_event = Arc::clone(&compared);
     let run = checker.evaluate("dynamics.stale", writer.sequence.clone(), move |run| {
-        compared.first_difference(run, |point| {
-            let [other_inputs, other_inputs_again] = &point.other_inputs;
-            let [first_inputs, first_inputs_again] = &point.first_inputs;
-            let [before_completed, after_completed] = &point.other_states;
-            vec![
-                (&point.after, &point.set_again, "after an event"),
-                (&point.after, first_inputs_again, "after an event"),
-                (&point.set_back, &point.set_again, "after other states were set and set back"),
-                (other_inputs, other_inputs_again, "after inputs were set"),
-                (first_inputs, first_inputs_again, "after inputs were set"),
-                (before_completed, after_completed, "before CompletedIntegratorStep"),
-            ]
-        })
+        compared.first_difference(run, |point| &point.after_event)
     })?;
     checker.record("dynamics.event-mode", &run, &writer.sequence, move |run| {
-        in_event.first_difference(run, |point| {
-            vec![(&point.in_event, &point.first_inputs[1], "in Event Mode after the last update")]
-        })
+        in_event.first_difference(run, |point| &point.in_event)
     });
     Ok(())
 }
@@ -140,15 +121,25 @@ fn write_point(writer: &mut Writer, unknowns: &Unknowns, point: &Point, states: 
         set_states(writer, 0.0);
         [before, unknowns.read(writer)]
     };
-    let other_inputs = with_inputs(&other_values);
-    let first_inputs = with_inputs(&point.inputs);
+    let [other_inputs, other_inputs_again] = with_inputs(&other_values);
+    let [first_inputs, first_inputs_again] = with_inputs(&point.inputs);
     set_states(writer, 1e-3);
-    let before = unknowns.read(writer);
-    let flag = Arg::Out(if writer.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
-    writer.call(0, "CompletedIntegratorStep", vec![Arg::Integer(0), flag.clone(), flag]);
-    let other_states = [before, unknowns.read(writer)];
-    let time = point.time;
-    PointSnapshots { time, in_event, after, set_again, set_back, other_inputs, first_inputs, other_states }
+    let before_completed = unknowns.read(writer);
+    writer.complete_step(0);
+    let after_completed = unknowns.read(writer);
+    PointSnapshots {
+        time: point.time,
+        repeated: [set_again.clone(), set_back.clone(), first_inputs_again.clone()],
+        in_event: [(in_event, first_inputs_again.clone(), "in Event Mode after the last update")],
+        after_event: vec![
+            (after.clone(), set_again.clone(), "after an event"),
+            (after, first_inputs_again.clone(), "after an event"),
+            (set_back, set_again, "after other states were set and set back"),
+            (other_inputs, other_inputs_again, "after inputs were set"),
+            (first_inputs, first_inputs_again, "after inputs were set"),
+            (before_completed, after_completed, "before CompletedIntegratorStep"),
+        ],
+    }
 }
 
 /// Snapshots at several points, and the names of their numbers.
@@ -159,9 +150,6 @@ struct Compared {
     points: Vec<PointSnapshots>,
 }
 
-/// Two snapshots whose numbers must be equal, and when the first one was read.
-type Pair<'a> = (&'a Snapshot, &'a Snapshot, &'static str);
-
 impl Compared {
     fn numbers(&self, run: &Run, snapshot: &Snapshot) -> Vec<Option<f64>> {
         self.unknowns.numbers(&self.description, run, snapshot)
@@ -170,10 +158,8 @@ impl Compared {
     /// Returns the largest magnitude of each number in all snapshots.
     fn magnitudes(&self, run: &Run) -> Vec<f64> {
         let mut magnitudes = vec![0.0_f64; self.names.len()];
-        let snapshots = self.points.iter().flat_map(|point| {
-            let pairs = point.other_inputs.iter().chain(&point.first_inputs).chain(&point.other_states);
-            [&point.in_event, &point.after, &point.set_again, &point.set_back].into_iter().chain(pairs)
-        });
+        let pairs = self.points.iter().flat_map(|point| point.after_event.iter().chain(&point.in_event));
+        let snapshots = pairs.flat_map(|(one, other, _)| [one, other]);
         for snapshot in snapshots {
             for (magnitude, number) in magnitudes.iter_mut().zip(self.numbers(run, snapshot)) {
                 *magnitude = number.map_or(*magnitude, |number| magnitude.max(number.abs()));
@@ -183,17 +169,11 @@ impl Compared {
     }
 
     /// Describes the first number that differs between the snapshots of a pair.
-    fn first_difference(
-        &self,
-        run: &Run,
-        pairs: impl Fn(&PointSnapshots) -> Vec<Pair<'_>>,
-    ) -> Option<String> {
+    fn first_difference(&self, run: &Run, pairs: impl Fn(&PointSnapshots) -> &[Pair]) -> Option<String> {
         let magnitudes = self.magnitudes(run);
         self.points.iter().find_map(|point| {
-            // These three snapshots have equal arguments, so their differences are the error of an iterative solver.
-            let repeated = [&point.set_again, &point.set_back, &point.first_inputs[1]]
-                .map(|snapshot| self.numbers(run, snapshot));
-            pairs(point).into_iter().find_map(|(one, other, when)| {
+            let repeated = point.repeated.each_ref().map(|snapshot| self.numbers(run, snapshot));
+            pairs(point).iter().find_map(|(one, other, when)| {
                 let (one, other) = (self.numbers(run, one), self.numbers(run, other));
                 (0..self.names.len()).find_map(|index| {
                     let (is, must) = (one[index]?, other[index]?);

@@ -1,14 +1,14 @@
 //! Checks simulations that start before zero and far from zero, with and without a stop time and a tolerance.
 
 use super::late_outputs::is_continuous;
-use crate::call_sequence::{CallSequence, End, Integration, Run, Step, Values};
+use crate::call_sequence::{CallSequence, End, Run, Values};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::failure_of;
 use crate::trajectory::step_size;
 use crate::values::{inputs_by, is_other_time};
 use crate::writer::Part::Make;
-use crate::writer::{Read, Trajectory, Writer, value_of};
+use crate::writer::{Read, Trajectory, Writer, number_of, value_of};
 use fmi_abi::{Causality, Variability};
 use std::sync::Arc;
 
@@ -47,20 +47,8 @@ impl Simulation {
         writer.enter_with(0, tolerance, start, stop);
         begin.extend(first..writer.next);
         begin.extend(writer.leave(0));
-        let states = description.states_count().unwrap_or(0);
-        let indicators = description.event_indicators.unwrap_or(0);
-        let mut steps = Vec::new();
-        for number in 0..count {
-            let time = |number: usize| start + number as f64 * size;
-            let id = if writer.trajectory.is_stepped() {
-                writer.step(0, time(number), size)
-            } else {
-                let (begin, end) = (time(number), time(number + 1));
-                let how = Integration { begin, end, steps: 4, euler: states == 0, states, indicators };
-                writer.add(Step::Integrate(0, how))
-            };
-            steps.push((id, writer.read(0)));
-        }
+        let step = |number| (writer.advance(0, start, size, number), writer.read(0));
+        let steps = (0..count).map(step).collect();
         writer.free(0);
         Self { start, size, begin, steps }
     }
@@ -97,9 +85,7 @@ impl Simulation {
 
     /// Returns the number of a scalar variable after each step.
     fn numbers(&self, run: &Run, variable: usize) -> Option<Vec<f64>> {
-        let number =
-            |(_, reads): &(u32, Vec<Read>)| value_of(run, reads, variable)?.numbers().first().copied();
-        self.steps.iter().map(number).collect()
+        self.steps.iter().map(|(_, reads)| number_of(run, reads, variable)).collect()
     }
 
     /// Returns the indices of the steps in which a variable changes.
@@ -227,9 +213,7 @@ impl Compared {
 
     /// Describes a value of the independent variable that is not the time, if all steps return OK.
     fn wrong_time(&self, run: &Run) -> Option<String> {
-        let mut variables = self.description.variables.iter();
-        let independent = variables.position(|variable| variable.causality == Causality::Independent)?;
-        let numbers = self.shifted.numbers(run, independent)?;
+        let numbers = self.shifted.numbers(run, self.description.independent()?)?;
         let succeeds = self.shifted.is_started(run)
             && self.shifted.steps.iter().all(|(id, _)| run.status(*id) == Some(0));
         numbers.into_iter().zip(1..).find_map(|(number, step)| {

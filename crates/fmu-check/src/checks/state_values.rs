@@ -1,12 +1,13 @@
 //! Checks that saved states contain the parameters, strings and inputs that were set (section 2.1.8 of FMI 2.0.5).
 
 use super::start_values::settable;
-use crate::call_sequence::{Step, Values};
+use super::states::from_bytes;
+use crate::call_sequence::Values;
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{any, failure};
+use crate::finding::{any, unless_fails};
 use crate::values::other_values;
-use crate::writer::Part::{Begin, Call, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
+use crate::writer::Part::{Call, Enter, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::Trajectory;
 use fmi_abi::BaseType;
 
@@ -63,7 +64,7 @@ pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
         let accepted = while_initializing(checker, trajectory, &values, &starts)?;
         after_reset(checker, trajectory, &values)?;
         if checker.serializes(trajectory.interface) {
-            from_bytes(checker, trajectory, &values)?;
+            from_bytes(checker, trajectory, &values, 1)?;
         }
         if accepted && number == 0 {
             break;
@@ -93,16 +94,14 @@ fn while_initializing(
     ids.extend(writer.set(0, starts));
     ids.extend(writer.write(0, &[Restore(0)]).ids);
     let third = writer.read_anyway(0, &indices);
-    let sequence = writer.sequence.clone();
+    let sequence = writer.sequence;
     let message = "{} was {} when the state was saved; after other values were set and the state was restored, it is {}";
     let criterion = any([checker.differ(&first, &second, message), checker.differ(&first, &third, message)]);
-    let (copy, all) = (sequence.clone(), ids.clone());
     // Some models reject the values not when they are set, but when a getter calculates with them.
-    ids.extend(first.iter().map(|read| read.id));
-    let run = checker.evaluate("states.restore-values", sequence, move |run| {
-        failure(&copy, run, &ids).is_none().then(|| criterion(run))?
-    })?;
-    Ok(all.iter().all(|id| run.status(*id).is_none_or(|status| status <= 1)))
+    let reads = first.iter().map(|read| read.id);
+    let criterion = unless_fails(&sequence, ids.iter().copied().chain(reads).collect(), criterion);
+    let run = checker.evaluate("states.restore-values", sequence, criterion)?;
+    Ok(ids.iter().all(|id| run.status(*id).is_none_or(|status| status <= 1)))
 }
 
 /// Checks the values and the simulation from a state that is restored after a reset.
@@ -117,40 +116,6 @@ fn after_reset(checker: &Checker, trajectory: &Trajectory, values: &Assigned) ->
     let message = "{} was {}, from the state that was restored after a reset it is {}";
     let criterion =
         any([checker.differ(&before, &after, message), checker.continued(&first, &second, message)]);
-    let sequence = writer.sequence.clone();
-    checker.check("states.restore-values", writer.sequence, move |run| {
-        failure(&sequence, run, &ids).is_none().then(|| criterion(run))?
-    })
-}
-
-/// Checks that the bytes of a state restore the values in a new instance, in the same and in a new process.
-fn from_bytes(checker: &Checker, trajectory: &Trajectory, values: &Assigned) -> anyhow::Result<()> {
-    for fresh in [false, true] {
-        let mut writer = checker.writer(trajectory);
-        let mut ids = writer.write(0, &[Make]).ids;
-        ids.extend(writer.set(0, values));
-        let [before] = writer.groups(0, &[Enter, Leave, Points(1), ReadAll]);
-        ids.extend(writer.write(0, &[Save(0)]).ids);
-        ids.extend(writer.serialize(0, 0));
-        let [first] = writer.groups(0, &[Run(1)]);
-        if fresh {
-            writer.add(Step::FreshProcess);
-        } else {
-            writer.write(0, &[Free]);
-        }
-        ids.extend(writer.write(1, &[Begin]).ids);
-        ids.push(writer.deserialize(1, 0, 1));
-        ids.extend(writer.write(1, &[Restore(1)]).ids);
-        let [after, second] = writer.groups(1, &[ReadAll, Run(1)]);
-        ids.extend(before.iter().map(|read| read.id));
-        let message = "{} was {}, from the bytes it is {}";
-        let criterion =
-            any([checker.differ(&before, &after, message), checker.continued(&first, &second, message)]);
-        let sequence = writer.sequence.clone();
-        let name = if fresh { "states.fresh-process" } else { "states.serialized" };
-        checker.check(name, writer.sequence, move |run| {
-            failure(&sequence, run, &ids).is_none().then(|| criterion(run))?
-        })?;
-    }
-    Ok(())
+    let criterion = unless_fails(&writer.sequence, ids, criterion);
+    checker.check("states.restore-values", writer.sequence, criterion)
 }

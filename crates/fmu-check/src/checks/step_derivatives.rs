@@ -7,7 +7,6 @@ use crate::call_sequence::Run;
 use crate::checker::Checker;
 use crate::trajectory::step_size;
 use crate::values::{inputs_by, other_numbers};
-use crate::writer::Part::{Enter, Free, Leave, Make};
 use crate::writer::{Read, Trajectory, Writer, values_of};
 use fmi_abi::Causality;
 use std::sync::Arc;
@@ -52,20 +51,14 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         for before in COMPARED_AFTER {
             let mut steps = Vec::new();
             for size in &SIZES[..if varied { SIZES.len() } else { 1 }] {
-                writer.write(0, &[Make]);
-                writer.set(0, &values);
-                writer.write(0, &[Enter, Leave]);
-                let mut time = description.start_time;
-                for _ in 0..before {
-                    writer.step(0, time, usual);
-                    time += usual;
-                }
+                writer.begin_with(0, &values);
+                let time = writer.steps(0, description.start_time, usual, before);
                 let reads = writer.read(0);
                 let id = writer.step(0, time, size * usual);
                 let reads = [reads, writer.read(0)];
                 // The sum of time and step size is rounded, so the step may have another size.
                 steps.push(ShortStep { size: time + size * usual - time, id, reads });
-                writer.write(0, &[Free]);
+                writer.free(0);
             }
             points.push(steps);
         }
@@ -73,18 +66,8 @@ pub fn steps(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let sequence = writer.sequence;
     let fmi3 = checker.fmi3();
     checker.check("dynamics.step-derivative", sequence, move |run| {
-        let names = |list: &[usize]| -> Vec<String> {
-            let of = |index: &usize| {
-                let variable = &description.variables[*index];
-                let size = variable.size.unwrap_or(1);
-                (0..size).map(move |element| match size {
-                    1 => variable.name.clone(),
-                    _ => format!("{}[{}]", variable.name, element + 1),
-                })
-            };
-            list.iter().flat_map(of).collect()
-        };
-        let (states, derivatives) = (names(&states), names(&derivatives));
+        let (states, derivatives) =
+            (description.element_names(&states), description.element_names(&derivatives));
         let mut found = vec![Found::default(); states.len()];
         points.iter().for_each(|steps| compare(run, steps, fmi3, &mut found));
         let is_wrong = |found: &Found| found.agreed == 0 && found.disagreed >= DISAGREEMENTS;

@@ -2,9 +2,9 @@
 //! two threads.
 
 use super::start_values::{settable, values_are_kept};
-use crate::call_sequence::{Numbered, Step, Values};
+use crate::call_sequence::Values;
 use crate::checker::Checker;
-use crate::finding::{any, failure};
+use crate::finding::{any, unless_fails};
 use crate::writer::Part::{Enter, Free, Leave, Make, Points};
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
@@ -59,12 +59,9 @@ pub fn instances(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
         reads.into_iter().map(each)
     };
     let criteria = any(are_kept(1).chain(are_kept(2)).collect::<Vec<_>>());
-    let sequence = writer.sequence.clone();
-    let sets = sets.clone();
-    checker.check("results.instances", writer.sequence, move |run| {
-        // A model may reject the strings, which is not a finding.
-        failure(&sequence, run, &sets).is_none().then(|| criteria(run))?
-    })
+    // A model may reject the strings, which is not a finding.
+    let criteria = unless_fails(&writer.sequence, sets, criteria);
+    checker.check("results.instances", writer.sequence, criteria)
 }
 
 /// Checks that each of two instances on different threads returns the string that was set in it. The worker copies the string
@@ -92,13 +89,12 @@ pub fn threads(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()>
     for instance in [1, 2] {
         write_instance(&mut writer, instance, 1);
     }
-    let mut sequences: Vec<Vec<Numbered>> = Vec::new();
+    let mut threads = Vec::new();
     for instance in [1, 2] {
-        let mut thread = Writer { next: writer.next, ..checker.writer(trajectory) };
+        let mut thread = threads.last().unwrap_or(&writer).thread();
         expect_kept(write_instance(&mut thread, instance, READS), instance);
-        writer.next = thread.next;
-        sequences.push(thread.sequence);
+        threads.push(thread);
     }
-    writer.add(Step::Parallel(sequences));
+    writer.join(threads);
     checker.check("results.threads", writer.sequence, any(criteria))
 }

@@ -8,7 +8,7 @@ use crate::writer::{Trajectory, value_of};
 /// values of states are positive and finite.
 pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let count = description.states_count().unwrap_or(0);
+    let count = description.states_count();
     let derivatives: Vec<usize> = description.derivatives.iter().map(|unknown| unknown.variable).collect();
     let states = description.states();
     if count == 0 || states.len() != derivatives.len() {

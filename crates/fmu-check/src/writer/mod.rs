@@ -4,13 +4,13 @@ mod parts;
 mod reads;
 mod variables;
 
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Step, Values};
+use crate::call_sequence::{Arg, CallSequence, Integration, Kind, Make, Numbered, Step, Values};
 use crate::description::Description;
 use crate::legal::Modes;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 pub use parts::{Calls, Part};
-pub use reads::{MAX_READ, Read, difference, sample, value_of, values_of};
+pub use reads::{MAX_READ, Read, difference, number_of, sample, value_of, values_of};
 
 /// Point of a trajectory.
 #[derive(Clone, Debug, Default)]
@@ -205,8 +205,53 @@ impl<'a> Writer<'a> {
         ids
     }
 
+    /// Instantiates, sets variables, and initializes, up to the mode in which time advances.
+    pub fn begin_with(&mut self, instance: usize, values: &[(usize, Values)]) {
+        self.make(instance);
+        self.set(instance, values);
+        self.enter(instance);
+        self.leave(instance);
+    }
+
     pub fn step(&mut self, instance: usize, time: f64, size: f64) -> u32 {
         self.call(instance, "DoStep", step_args(self.description.standard, time, size))
+    }
+
+    /// Makes `count` steps of this size; returns the time after them.
+    pub fn steps(&mut self, instance: usize, mut time: f64, size: f64, count: usize) -> f64 {
+        for _ in 0..count {
+            self.step(instance, time, size);
+            time += size;
+        }
+        time
+    }
+
+    /// Integrates Model Exchange with four Runge-Kutta steps, or a step of Euler's method if there are no states.
+    pub fn integrate(&mut self, instance: usize, begin: f64, end: f64) -> u32 {
+        let euler = self.description.states_count() == 0;
+        self.integrate_in(instance, begin, end, 4, euler)
+    }
+
+    /// Integrates Model Exchange with this number of steps of Euler's or of the classical Runge-Kutta method.
+    pub fn integrate_in(&mut self, instance: usize, begin: f64, end: f64, steps: usize, euler: bool) -> u32 {
+        let (states, indicators) = (self.description.states_count(), self.description.indicators_count());
+        self.add(Step::Integrate(instance, Integration { begin, end, steps, euler, states, indicators }))
+    }
+
+    /// Advances by the step of this number, counted from 0, of a simulation in equal steps: by a step of Co-Simulation, or by an
+    /// integration of the same duration.
+    pub fn advance(&mut self, instance: usize, start: f64, size: f64, number: usize) -> u32 {
+        let time = |number: usize| start + number as f64 * size;
+        match self.trajectory.is_stepped() {
+            true => self.step(instance, time(number), size),
+            false => self.integrate(instance, time(number), time(number + 1)),
+        }
+    }
+
+    /// Completes an integrator step of Model Exchange.
+    pub fn complete_step(&mut self, instance: usize) -> u32 {
+        let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
+        self.call(instance, "CompletedIntegratorStep", vec![Arg::Integer(0), flag.clone(), flag])
     }
 
     pub fn set_states(&mut self, instance: usize, states: &[f64]) -> u32 {
@@ -221,6 +266,28 @@ impl<'a> Writer<'a> {
     /// Reads a vector of `count` numbers.
     pub fn vector(&mut self, instance: usize, function: &str, count: usize) -> u32 {
         self.call(instance, function, vec![Arg::Out(Kind::F64, count), Arg::Integer(count as i64)])
+    }
+
+    /// Reads the vectors of Model Exchange that have elements: states, derivatives and event indicators.
+    pub fn vectors(&mut self, instance: usize) -> [Option<u32>; 3] {
+        let (states, indicators) = (self.description.states_count(), self.description.indicators_count());
+        [
+            ("GetContinuousStates", states),
+            (self.derivatives_name(), states),
+            ("GetEventIndicators", indicators),
+        ]
+        .map(|(name, count)| (count > 0).then(|| self.vector(instance, name, count)))
+    }
+
+    /// Returns a writer for the steps of a thread, whose numbers follow the ones of this writer.
+    pub fn thread(&self) -> Self {
+        Self { next: self.next, ..Self::new(self.description, self.trajectory, self.readable) }
+    }
+
+    /// Runs the steps of these writers at the same time. Each was made by `thread` of the one before, the first by `thread` of this.
+    pub fn join(&mut self, threads: Vec<Self>) {
+        self.next = threads.last().map_or(self.next, |thread| thread.next);
+        self.add(Step::Parallel(threads.into_iter().map(|thread| thread.sequence).collect()));
     }
 
     pub fn derivatives_name(&self) -> &'static str {

@@ -1,7 +1,7 @@
 //! Parts of a simulation, from which the checks compose call sequences.
 
 use super::{Point, Read, Writer};
-use crate::call_sequence::{Arg, Kind};
+use crate::call_sequence::Arg;
 
 /// Part of a simulation.
 #[derive(Clone, Copy, Debug)]
@@ -106,12 +106,7 @@ impl Writer<'_> {
                 ids.push(self.set_states(instance, &point.states));
             }
             ids.extend(self.set(instance, &point.inputs));
-            let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
-            ids.push(self.call(
-                instance,
-                "CompletedIntegratorStep",
-                vec![Arg::Integer(0), flag.clone(), flag],
-            ));
+            ids.push(self.complete_step(instance));
         }
         if point.event {
             ids.extend(self.event(instance));

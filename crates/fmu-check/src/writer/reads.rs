@@ -109,6 +109,11 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
     })
 }
 
+/// Returns the first number of a variable in the first successful read that contains it.
+pub fn number_of(run: &Run, reads: &[Read], variable: usize) -> Option<f64> {
+    value_of(run, reads, variable)?.numbers().first().copied()
+}
+
 /// Returns the value of a variable in the first successful read that contains it.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Values> {
     reads.iter().find_map(|read| {

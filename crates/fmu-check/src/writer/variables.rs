@@ -98,16 +98,8 @@ impl Writer<'_> {
     pub fn read_all(&mut self, instance: usize) -> Vec<Read> {
         let mut reads = self.read(instance);
         if !self.trajectory.is_stepped() {
-            let states = self.description.states_count().unwrap_or(0);
-            let indicators = self.description.event_indicators.unwrap_or(0);
-            let vectors = [
-                ("GetContinuousStates", states),
-                (self.derivatives_name(), states),
-                ("GetEventIndicators", indicators),
-            ];
-            for (name, count) in vectors.into_iter().filter(|(_, count)| *count > 0) {
-                reads.push(Read { id: self.vector(instance, name, count), variables: Vec::new() });
-            }
+            let vectors = self.vectors(instance).into_iter().flatten();
+            reads.extend(vectors.map(|id| Read { id, variables: Vec::new() }));
         }
         reads
     }
