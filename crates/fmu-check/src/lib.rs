@@ -186,29 +186,6 @@ pub fn check(path: &Path, options: &Options, progress: Progress) -> anyhow::Resu
     Ok(report)
 }
 
-/// Compares Co-Simulation with Model Exchange of an FMU that offers both, by simulations of at most 40 steps. Returns a
-/// description of the first difference that is too large to be an error of a solver; `None` if there is no such difference, or if
-/// the simulations cannot be compared.
-///
-/// The program must call [`run_worker_if_requested`] first in `main`.
-///
-/// # Errors
-/// Fails if the file is not an FMU of FMI 2.0 or 3.0, or if a temporary file cannot be written.
-pub fn compare_interfaces(path: &Path) -> anyhow::Result<Option<String>> {
-    let options = Options { time: 20.0, ..Options::default() };
-    let (_scratch, mut checker) = opened(path, &options, Instant::now())?;
-    if checker.setting.libraries[0].is_none() || checker.setting.libraries[1].is_none() {
-        return Ok(None);
-    }
-    simulate(&mut checker)?;
-    match checks::interfaces::compare(&checker) {
-        Err(error) if !error.is::<Stop>() => return Err(error),
-        _ => {}
-    }
-    let found = checker.findings().into_iter().find(|finding| finding.name == "results.interfaces");
-    Ok(found.map(|finding| finding.observed))
-}
-
 /// Unpacks an FMU. Returns the temporary directory with its files, and a checker that has recorded the findings in these files
 /// and the interface types that cannot be checked.
 fn opened(
@@ -252,11 +229,12 @@ fn opened(
     Ok((scratch, checker))
 }
 
-/// Returns whether the options include a topic, or a rule that they name.
-fn is_wanted(options: &Options, topic: &str) -> bool {
+/// Returns whether the options include a topic or a rule.
+fn is_wanted(options: &Options, name: &str) -> bool {
+    let topic = finding::topic_of(name);
     match options.only.is_empty() {
         true => !options.quick || !LONG.contains(&topic),
-        false => options.only.iter().any(|only| only == topic),
+        false => options.only.iter().any(|only| only == topic || only == name),
     }
 }
 
@@ -283,7 +261,7 @@ impl Session {
             Some(directory) => self.report(self.wanted_findings()).write(directory),
             None => Ok(()),
         };
-        execute_checks(checker, progress, &|topic| is_wanted(options, topic), &write_report)?;
+        execute_checks(checker, progress, &|name| is_wanted(options, name), &write_report)?;
         let findings =
             self.findings.get_or_init(|| self.wanted_findings().into_iter().map(Mutex::new).collect());
         prove(checker, findings, options, progress);
@@ -323,8 +301,7 @@ impl Session {
     fn wanted_findings(&self) -> Vec<Finding> {
         let mut findings = self.checker.findings();
         let is_wanted_finding = |finding: &Finding| {
-            is_wanted(&self.options, finding.topic())
-                || is_wanted(&self.options, &finding.name)
+            is_wanted(&self.options, &finding.name)
                 || ["arrays", "logs"].contains(&finding.topic())
                 || ALWAYS.contains(&finding.name.as_str())
         };

@@ -1,11 +1,14 @@
 //! Options of a check.
 
 use crate::rules;
+use clap::{Args as _, FromArgMatches as _};
 use std::path::PathBuf;
 
 /// Options of a check, which are also the options of the command line.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
+    // A program may also list rules. The check of a rule is executed if it has the name of the rule in the table of checks; findings of
+    // other rules are reported if a check of a listed topic makes them.
     /// Checks only these topics, separated by commas: description, package, functions, start_values, life_cycle,
     /// states, derivatives, dependencies, dynamics, results, reset, rejections, logs, resources, malformed.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
@@ -61,7 +64,7 @@ pub struct Options {
     #[arg(long)]
     pub execution_tool: bool,
     /// Whether this is the check of a build: it makes the calls of a quick check, but in `time` and with `limit`, because a slow model
-    /// is not a mistake, and `only` may also name rules, whose findings are then reported if a check of a listed topic makes them.
+    /// is not a mistake.
     #[arg(skip)]
     pub is_build: bool,
 }
@@ -69,25 +72,9 @@ pub struct Options {
 /// The defaults of the command.
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            only: Vec::new(),
-            allow_unchecked: Vec::new(),
-            time: 120.0,
-            limit: 10.0,
-            memory: 8192,
-            unpacked: 1000,
-            seed: 1,
-            quick: false,
-            baseline: None,
-            explain: None,
-            out: None,
-            json: false,
-            fail_on: FailOn::Violation,
-            repeat: 1.5,
-            no_shrink: false,
-            execution_tool: false,
-            is_build: false,
-        }
+        let command = Self::augment_args(clap::Command::new("fmu-check")).no_binary_name(true);
+        let matches = command.get_matches_from([""; 0]);
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
     }
 }
 
@@ -110,7 +97,7 @@ pub const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled
 #[cfg(test)]
 mod tests {
     use super::Options;
-    use clap::Args;
+    use clap::Args as _;
 
     #[test]
     fn the_readme_states_the_defaults() {

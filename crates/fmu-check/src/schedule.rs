@@ -3,7 +3,7 @@
 use crate::activity::Activity;
 use crate::checker::Checker;
 use crate::checks::{ALL, Check, malformed};
-use crate::finding::Finding;
+use crate::finding::{Finding, topic_of};
 use crate::options::Options;
 use crate::rules::TOPICS;
 use crate::run::Stop;
@@ -69,7 +69,7 @@ fn execute_check(checker: &Checker, check: Check, trajectory: Option<&Trajectory
     }
 }
 
-/// Executes all checks of the wanted topics on several threads, and calls `write_report` after each check. Returns an error if a
+/// Executes all checks of the wanted topics and rules on several threads, and calls `write_report` after each check. Returns an error if a
 /// check or `write_report` fails; a check that is stopped does not fail.
 pub fn execute_checks(
     checker: &Checker,
@@ -77,11 +77,11 @@ pub fn execute_checks(
     wanted: &(impl Fn(&str) -> bool + Sync),
     write_report: &(impl Fn() -> anyhow::Result<()> + Sync),
 ) -> anyhow::Result<()> {
-    let wanted_checks = ALL.iter().filter(|(topic, _)| wanted(topic));
+    let wanted_checks = ALL.iter().filter(|(name, _)| wanted(name));
     let jobs: Vec<_> = wanted_checks
-        .flat_map(|(topic, check)| {
+        .flat_map(|(name, check)| {
             let each = checker.trajectories.iter().map(Some);
-            std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))
+            std::iter::once(None).chain(each).map(move |trajectory| (topic_of(name), *check, trajectory))
         })
         .collect();
     // The report lists a topic as not checked until all its checks have ended.

@@ -89,7 +89,7 @@ impl Fits {
     }
 }
 
-/// Topic and function of every check that calls the library.
+/// Topic and function of every check that calls the library. A check that can be requested separately has the name of its rule instead.
 pub const ALL: &[(&str, Check)] = &[
     ("life_cycle", Each(Always, life_cycle::sequences)),
     ("life_cycle", Once(life_cycle::free_null)),
@@ -114,7 +114,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("dependencies", Each(Always, dependencies::initial)),
     ("dependencies", Each(Always, dependencies::kinds)),
     ("rejections", Each(Always, rejections::change_nothing)),
-    ("results", Once(interfaces::compare)),
+    ("results.interfaces", Once(interfaces::compare)),
     ("results", Each(Several, results::instances)),
     ("results", Each(Several, strings::instances)),
     ("results", Each(Several, several::freed)),
