@@ -19,7 +19,7 @@ CHECK = ROOT / "target" / "debug" / "cargo-fmu"
 def listed(model: str) -> list[tuple[str, str, str]]:
     """Returns severity, name and observation of the notes that the documentation lists for an FMU."""
     rows = read_table(ROOT / "docs" / "checking.md", "This project's FMUs").rows
-    return [("note", name.strip("`"), observation) for name, fmu, observation, _ in rows if fmu == model]
+    return [("note", name.strip("`"), observation) for name, fmus, observation, _ in rows if model in fmus.split(", ")]
 
 
 def needs_new_system(fmu: Path) -> bool:

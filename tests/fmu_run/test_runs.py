@@ -275,7 +275,6 @@ def test_the_programs_run(fmu, monkeypatch, capsys):
     assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
     assert len({*names["wrists"].time}) == 2, "some of the instances must be restored, but not all"
     assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
-    assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()
     shapes = re.findall(r"^(?:([^\s#=][^#=]*?)|\s*(\w+) = .*?) +# (\([\d, ]+\))", text, flags=re.M)
     assert len(shapes) == 6
     for expression, name, shape in shapes:

@@ -173,7 +173,7 @@ fn listed(model: &str) -> BTreeSet<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/checking.md");
     let page = fs::read_to_string(page).unwrap();
     let rows = page.lines().map(|row| row.split(" | ").collect::<Vec<_>>());
-    rows.filter(|row| row.get(1) == Some(&model))
+    rows.filter(|row| row.get(1).is_some_and(|fmus| fmus.split(", ").any(|fmu| fmu == model)))
         .map(|row| format!("note {} {}", row[0].trim_matches(['|', ' ', '`']), row[2]))
         .collect()
 }
