@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 
-import fmpy
 import machine
 import numpy as np
 import pytest
 from built import ROOT, built
-from fmpy.validation import validate_fmu
 from fmu_run import Fmu, System
 from lagrange import table_1
 from scipy.integrate import solve_ivp
@@ -29,12 +27,6 @@ def exact(time: np.ndarray) -> machine.Trajectory:
     found = machine.pushed(time, table_1(), J1, torque)
     assert np.abs(found.tau).max() > 0.1 and np.abs(found.roll).max() > 0.1
     return found
-
-
-@pytest.mark.parametrize("name", ["prw_motor.fmu", "fmi3/prw_motor.fmu"])
-def test_the_validator_reports_nothing(name):
-    fmu = str(built(name))
-    assert fmpy.read_model_description(fmu, validate=True) and validate_fmu(fmu) == []
 
 
 @pytest.mark.parametrize("version, order", [("", "dependencies"), ("fmi3/", "jacobi")])

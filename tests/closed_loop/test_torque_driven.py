@@ -1,5 +1,5 @@
-"""Motors that are driven by torque: examples/torque_driven.py in Co-Simulation, the FMU in Model Exchange, and the models for
-OpenModelica, compared with the machine of tests/oracle/machine.py, whose equations come from energies only."""
+"""Motors that are driven by torque: examples/torque_driven.py in Co-Simulation, and the models for OpenModelica, compared with the
+machine of tests/oracle/machine.py, whose equations come from energies only."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ import machine
 import numpy as np
 import pytest
 from built import ROOT, built, text_of
-from fmu_run import Fmu
 from lagrange import table_1
-from scipy.integrate import solve_ivp
 
 from tools.documentation.sources import TESTBED, read_description, read_table
 
@@ -71,33 +69,6 @@ def test_the_document_has_the_errors_that_the_example_prints(example, monkeypatc
             _, coupled = example.simulate(h, extrapolated, example.jump, 0.1)
             error = np.abs(coupled["tau1"] - exact[: round(0.1 / example.FINEST) + 1 : round(h / example.FINEST)]).max()
             assert 100 * error / np.abs(exact).max() == pytest.approx(share, rel=0.1, abs=0.01)
-
-
-def test_model_exchange_needs_no_communication_points(moved):
-    """One solver integrates motors and testbed together, with direct connections both ways."""
-    motor, gains = machine.MOTOR_DATA, machine.GAINS
-    with Fmu(built("prw_testbed.fmu")) as fmu:
-        testbed = fmu.instances(interface="model-exchange")
-
-        def slope(t, x):
-            states, theta, omega, current, integral = x[:6], x[6:8], x[8:10], x[10:12], x[12:]
-            testbed.set_time(t)
-            testbed.set_continuous_states([states])
-            testbed.set(("theta1", "theta2", "omega1", "omega2"), [[*theta, *omega]])
-            tau = testbed.get(["tau1", "tau2"])[0]
-            theta_ref, omega_ref = machine.reference(t)
-            wanted = gains["stiffness"] * (theta_ref - theta) + gains["damping"] * (omega_ref - omega)
-            error = wanted / motor["k"] - current
-            voltage = gains["proportional"] * error + integral
-            dry = motor["friction"] * np.tanh(omega / motor["creep"])
-            torque = motor["k"] * current - motor["damping"] * omega - dry
-            flow = (voltage - motor["R"] * current - motor["k"] * omega) / motor["L"]
-            states = testbed.get_derivatives()[0]
-            return np.concatenate([states, omega, (torque + tau) / motor["J1"], flow, gains["integral"] * error])
-
-        found = solve_ivp(slope, (0, 0.3), np.zeros(14), "LSODA", TIME[:301], rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(found.y[6:8].T, moved.theta[:301], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(found.y[8:10].T, moved.omega[:301], rtol=0, atol=1e-6)
 
 
 def compiled(text: str) -> dict[str, np.ndarray]:
