@@ -86,15 +86,6 @@ def test_the_testbed(testbed, read_before_set):
     np.testing.assert_array_equal(runs.time, time)
 
 
-def test_the_controller(controller):
-    time, inputs = motion()
-    inputs = dict(zip(["pitch_ref", "roll_ref", "pitch", "tau1"], inputs.values()))
-    outputs = ["theta1", "theta2", "omega1", "pitch_correction"]
-    expected = by_fmpy(controller, time, inputs, {"Kp": 0.5}, outputs)
-    with fmu_run.Fmu(controller) as fmu:
-        same(fmu.run(time, inputs=inputs, start={"Kp": 0.5}, outputs=outputs), expected)
-
-
 def test_input_derivatives(fmu):
     time, inputs = motion()
     slopes = {"theta1": inputs.pop("omega1"), "theta2": inputs.pop("omega2")}
