@@ -274,14 +274,21 @@ def cargo_test(library: Path, *arguments: str, profile: str = "release", **envir
     return done.stdout
 
 
+def compile_library(sources: Path, directory: Path, *options: str, model: str = "prw_testbed") -> Path:
+    """Compiles the sources of a model with gcc to a library in the directory."""
+    COMPILERS["gcc"].require()
+    library, files = directory / f"{model}.so", [str(sources / f"{model}{end}.c") for end in ("", "_fmi2")]
+    COMPILERS["gcc"].compile(sources, library, *options, "-fPIC", "-shared", *files, "-lm")
+    return library
+
+
+#: The random sessions pass arrays of 5000 values, for which the default memory is too small.
+LARGE = "-DFMU_MEMORY_PAGES=64"
+
+
 def test_the_tests_of_the_library_pass(unpacked_without_guid: Path, tmp_path: Path) -> None:
     """Compares all results of random sessions, and runs the tests of the C interface, on the compiled sources."""
-    library = tmp_path / "compiled.so"
-    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
-    # The sessions pass arrays of 5000 values, for which the default memory is too small.
-    COMPILERS["gcc"].compile(
-        unpacked_without_guid, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm"
-    )
+    library = compile_library(unpacked_without_guid, tmp_path, "-O2", LARGE)
     output = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
     assert f"in {os.environ.get('SESSIONS', '300')} sessions" in output
 
@@ -289,21 +296,14 @@ def test_the_tests_of_the_library_pass(unpacked_without_guid: Path, tmp_path: Pa
 @pytest.mark.small
 def test_random_sessions(unpacked_without_guid: Path, tmp_path: Path) -> None:
     """Runs fewer sessions than the test above. With `--workspace`, cargo reuses what `make test` has compiled."""
-    COMPILERS["gcc"].require()
-    library = tmp_path / "compiled.so"
-    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
-    COMPILERS["gcc"].compile(
-        unpacked_without_guid, library, "-O0", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm"
-    )
+    library = compile_library(unpacked_without_guid, tmp_path, "-O0", LARGE)
     arguments = ("--workspace", "--test", "c_sources", "--", "--ignored", "--nocapture")
     assert "in 30 sessions" in cargo_test(library, *arguments, profile="dev", SESSIONS="30")
 
 
 def test_random_sessions_with_sanitizers(unpacked_without_guid: Path, tmp_path: Path) -> None:
-    library = tmp_path / "compiled.so"
-    files = [str(unpacked_without_guid / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
-    options = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g", "-fPIC", "-shared")
-    COMPILERS["gcc"].compile(unpacked_without_guid, library, *options, "-DFMU_MEMORY_PAGES=64", *files, "-lm")
+    options = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+    library = compile_library(unpacked_without_guid, tmp_path, *options, LARGE)
     asan = subprocess.run(["gcc", "-print-file-name=libasan.so"], check=True, capture_output=True, text=True).stdout
     rustc = subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout
     (host,) = (line.removeprefix("host: ") for line in rustc.splitlines() if line.startswith("host: "))
@@ -320,9 +320,7 @@ def test_a_panic_ends_its_instance_only(tmp_path: Path) -> None:
     command = ["cargo", "run", "--locked", "--release", "--package", "fmu-package", "--example", "c_sources"]
     environment = {"WASM2C": str(ROOT / ".venv" / "bin" / "wasm2c"), **os.environ}
     subprocess.run([*command, file, "faulty", tmp_path], cwd=ROOT, env=environment, check=True)
-    library = tmp_path / "faulty.so"
-    files = [str(tmp_path / name) for name in ("faulty.c", "faulty_fmi2.c")]
-    COMPILERS["gcc"].compile(tmp_path, library, "-O1", "-fPIC", "-shared", *files, "-lm")
+    library = compile_library(tmp_path, tmp_path, "-O1", model="faulty")
     assert "1 passed" in cargo_test(library, "--package", "fmu-export", "--test", "panics", "--", "--ignored")
 
 
