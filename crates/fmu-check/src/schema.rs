@@ -35,33 +35,30 @@ mod tests {
     use super::violation;
     use fmi_abi::Standard;
 
-    fn of(changed: [&str; 2]) -> Option<String> {
-        let text = fmu_test_kit::c_models::read("wagon2.xml");
-        assert!(text.contains(changed[0]), "{}", changed[0]);
-        let text = text.replacen(changed[0], changed[1], 1);
-        violation(Standard::Fmi2, "2.0", &text).map(|(_, why)| why)
-    }
-
-    #[test]
-    fn descriptions_are_valid() {
-        assert_eq!(of(["mass", "mass"]), None);
-        let text = fmu_test_kit::c_models::read("wagon3.xml");
-        assert_eq!(violation(Standard::Fmi3, "3.0", &text), None);
-    }
-
     #[test]
     fn a_violation_names_its_line() {
-        let boolean = of([r#"canGetAndSetFMUstate="true""#, r#"canGetAndSetFMUstate="yes""#]);
+        let of = |standard: Standard, before: &str, after: &str| {
+            let (version, file) = [("2.0", "wagon2.xml"), ("3.0", "wagon3.xml")][standard as usize];
+            let text = fmu_test_kit::c_models::read(file);
+            assert!(text.contains(before), "{before}");
+            violation(standard, version, &text.replacen(before, after, 1)).map(|(_, why)| why)
+        };
+        let boolean = of(Standard::Fmi2, r#"canGetAndSetFMUstate="true""#, r#"canGetAndSetFMUstate="yes""#);
         assert_eq!(boolean.as_deref(), Some("line 3: 'yes' is not a valid boolean"));
-        for changed in [
-            [r#"numberOfEventIndicators="1""#, r#"numberOfEventIndicators="-1""#],
-            ["<Outputs>", "<Exits/><Outputs>"],
-            [r#"<Real start="2"/>"#, r#"<Real start="2" colour="red"/>"#],
-            [r#"<Real start="2"/>"#, r#"<Real start="1,5"/>"#],
-            ["<DefaultExperiment", "<ModelVariables/><DefaultExperiment"],
-            [r#" modelName="wagon""#, ""],
+        for (standard, before, after) in [
+            (Standard::Fmi2, r#"numberOfEventIndicators="1""#, r#"numberOfEventIndicators="-1""#),
+            (Standard::Fmi2, "<Outputs>", "<Exits/><Outputs>"),
+            (Standard::Fmi2, r#"<Real start="2"/>"#, r#"<Real start="2" colour="red"/>"#),
+            (Standard::Fmi2, r#"<Real start="2"/>"#, r#"<Real start="1,5"/>"#),
+            (Standard::Fmi2, "<DefaultExperiment", "<ModelVariables/><DefaultExperiment"),
+            (Standard::Fmi2, r#" modelName="wagon""#, ""),
+            (Standard::Fmi3, r#"canGetAndSetFMUState="true""#, r#"canGetAndSetFMUState="yes""#),
+            (Standard::Fmi3, r#"valueReference="1" "#, ""),
+            (Standard::Fmi3, r#"variability="fixed""#, r#"variability="sometimes""#),
+            (Standard::Fmi3, r#"causality="local""#, r#"causality="local" initial="guessed""#),
+            (Standard::Fmi3, r#"causality="local""#, r#"causality="local" previous="x""#),
         ] {
-            assert!(of(changed).is_some(), "{changed:?}");
+            assert!(of(standard, before, after).is_some(), "{before}: {after}");
         }
     }
 }
