@@ -69,6 +69,16 @@ impl Kind {
     pub const fn is_float(self) -> bool {
         matches!(self, Self::F64 | Self::F32)
     }
+
+    /// Formats the number that these bits represent, with all its digits.
+    pub fn show(self, bits: u64) -> String {
+        match self {
+            Self::F64 | Self::F32 => format!("{:?}", self.number(bits)),
+            Self::I64 => (bits as i64).to_string(),
+            Self::U64 | Self::Size | Self::Pointer => bits.to_string(),
+            _ => self.number(bits).to_string(),
+        }
+    }
 }
 
 /// Argument of a call.

@@ -50,14 +50,26 @@ impl Values {
         })
     }
 
+    /// Returns values that differ from these, and are unlikely to be values of the FMU.
+    pub fn others(&self) -> Self {
+        let other =
+            |number: f64| if number.is_finite() { number + 1234.5 + 0.37 * number.abs() } else { 0.0 };
+        match self {
+            Self::Numbers(kind, _) => Self::new(*kind, self.numbers().into_iter().map(other)),
+            Self::Strings(texts) => {
+                let other =
+                    |text: &Option<Vec<u8>>| Some([text.as_deref().unwrap_or_default(), b"x"].concat());
+                Self::Strings(texts.iter().map(other).collect())
+            }
+        }
+    }
+
     /// Formats the value at an index for messages.
     pub fn show(&self, index: usize) -> String {
         match self {
-            Self::Numbers(kind, bits) => match bits.get(index).map(|bits| kind.number(*bits)) {
-                Some(number) if kind.is_float() => format!("{number:?}"),
-                Some(number) => number.to_string(),
-                None => "nothing".to_owned(),
-            },
+            Self::Numbers(kind, bits) => {
+                bits.get(index).map_or_else(|| "nothing".to_owned(), |bits| kind.show(*bits))
+            }
             Self::Strings(texts) => match texts.get(index) {
                 Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
                 _ => "NULL".to_owned(),

@@ -1,8 +1,7 @@
 //! Call sequences as text.
 
 use crate::call_sequence::{
-    Arg, CallSequence, End, Integration, Kind, Make, NULL_INSTANCE, Numbered, Outcome, Run, Step, Values,
-    step_of,
+    Arg, CallSequence, End, Integration, Make, NULL_INSTANCE, Numbered, Outcome, Run, Step, Values, step_of,
 };
 use crate::description::{Description, type_name};
 use crate::evidence::{Evidence, Expected, Measure};
@@ -127,7 +126,7 @@ impl Printed<'_> {
                 let refers = argument.is_some_and(|argument| argument.of.ends_with("ValueReference"));
                 let element = |bits: &u64| match refers {
                     true => self.reference(function, *bits),
-                    false => number(*kind, *bits),
+                    false => kind.show(*bits),
                 };
                 list(bits.iter().map(element))
             }
@@ -166,16 +165,6 @@ fn instance(index: Option<usize>) -> String {
     }
 }
 
-fn number(kind: Kind, bits: u64) -> String {
-    let number = kind.number(bits);
-    match kind {
-        _ if kind.is_float() => format!("{number:?}"),
-        Kind::I64 => (bits as i64).to_string(),
-        Kind::U64 | Kind::Size | Kind::Pointer => bits.to_string(),
-        _ => number.to_string(),
-    }
-}
-
 /// Returns a string in quotes; bytes that are not UTF-8 are replaced.
 fn string(bytes: Option<&[u8]>) -> String {
     bytes.map_or("NULL".to_owned(), |bytes| {
@@ -195,7 +184,7 @@ fn list(elements: impl ExactSizeIterator<Item = String>) -> String {
 
 fn values(values: &Values) -> String {
     match values {
-        Values::Numbers(kind, bits) => list(bits.iter().map(|bits| number(*kind, *bits))),
+        Values::Numbers(kind, bits) => list(bits.iter().map(|bits| kind.show(*bits))),
         Values::Strings(texts) => list(texts.iter().map(|text| string(text.as_deref()))),
     }
 }

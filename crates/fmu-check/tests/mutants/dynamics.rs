@@ -1,9 +1,8 @@
 //! Faults in the behaviour in time. Each check tests several of them, because a check takes much longer than finding another
 //! fault.
 
-use super::wagon::{UNLIMITED, check};
+use super::wagon::{all_found, findings};
 use fmu_test_kit::c_models;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -13,36 +12,10 @@ fn spring(directory: &Path, fmi: u32) -> PathBuf {
     c_models::pack(directory, ("spring", fmi), &description, &c_models::library("spring", &[]), &[])
 }
 
-/// Checks the FMU with these faults; returns the findings, except the expected ones.
-fn findings(fmi: u32, faults: &str, topics: &str) -> Vec<Value> {
-    let directory = TempDir::new().expect("a directory");
-    let mut command = check(&spring(directory.path(), fmi));
-    command.args(UNLIMITED).args(["--only", topics, "--no-shrink", "--json"]).env("FMU_TRAITS", faults);
-    let output = command.output().expect("runs");
-    let report: Value = serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
-    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
-    let mut findings = report["findings"].as_array().expect("a list").clone();
-    // Depends on the system.
-    findings.retain(|finding| finding["name"] != "package.glibc");
-    // The calls are so many that failure messages would be unreadable.
-    findings.iter_mut().for_each(|finding| finding["replay"] = Value::Null);
-    findings
-}
-
-/// Asserts that each of the faults is found. `expected` has the fault, the name of the rule, and a part of an observation for
-/// each. The calls of the finding must show it again.
+/// Asserts that each of the faults is found, as [`all_found`] does.
 fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
-    let faults: Vec<&str> = expected.iter().map(|(fault, ..)| *fault).collect();
-    let findings = findings(fmi, &faults.join(","), topics);
-    for (fault, name, what) in expected {
-        let finding = findings.iter().find(|finding| finding["name"] == *name);
-        let finding = finding.unwrap_or_else(|| panic!("{fault} is not found as {name}: {findings:#?}"));
-        let others = finding["more"].as_array().into_iter().flatten().chain([&finding["observed"]]);
-        let mut observed = others.filter_map(Value::as_str);
-        assert!(observed.any(|observed| observed.contains(what)), "{fault}: {finding:#}");
-        assert_eq!(finding["proof"], "shown", "{fault}: {finding:#}");
-    }
+    let directory = TempDir::new().expect("a directory");
+    all_found(&spring(directory.path(), fmi), topics, expected);
 }
 
 #[test]
@@ -107,7 +80,9 @@ fn sound() {
         (2, "harmless_noise"),
         (3, "harmless_euler"),
     ] {
-        let findings = findings(fmi, variants, "dynamics,start_values,derivatives");
+        let directory = TempDir::new().expect("a directory");
+        let (path, out) = (spring(directory.path(), fmi), directory.path().join("out"));
+        let findings = findings(&path, variants, "dynamics,start_values,derivatives", &out);
         assert!(findings.is_empty(), "{variants}: {findings:#?}");
     }
 }

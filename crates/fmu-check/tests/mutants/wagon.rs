@@ -39,6 +39,36 @@ pub fn found(fmu: &Path, fault: &str, options: &[&str]) -> (Vec<(String, String)
     (findings.iter().map(|finding| (text(finding, "name"), text(finding, "observed"))).collect(), report)
 }
 
+/// Checks topics of an FMU with faults; returns the findings, except the ones that depend on the system. The reports are in `out`.
+pub fn findings(fmu: &Path, faults: &str, topics: &str, out: &Path) -> Vec<serde_json::Value> {
+    let options = ["--only", topics, "--no-shrink", "--repeat", "0.1", "--out", &out.to_string_lossy()];
+    let (_, report) = found(fmu, faults, &options);
+    let unchecked = report["unreached"].as_array().expect("a list");
+    assert!(unchecked.iter().all(|of| of["allowed"] == true), "{unchecked:?}");
+    let mut findings = report["findings"].as_array().expect("a list").clone();
+    findings.retain(|finding| finding["name"] != "package.glibc");
+    // The calls are so many that failure messages would be unreadable.
+    findings.iter_mut().for_each(|finding| finding["replay"] = serde_json::Value::Null);
+    findings
+}
+
+/// Asserts that each of the faults of an FMU is found, although it has all of them. `expected` has the fault, the name of the rule, and a
+/// part of an observation for each. The calls of each finding must show it again, but not in the FMU without faults.
+pub fn all_found(fmu: &Path, topics: &str, expected: &[(&str, &str, &str)]) {
+    let out = fmu.with_extension("out");
+    let faults = expected.iter().map(|(fault, ..)| *fault).collect::<Vec<_>>().join(",");
+    let findings = findings(fmu, &faults, topics, &out);
+    for (fault, name, what) in expected {
+        let finding = findings.iter().find(|finding| finding["name"] == *name);
+        let finding = finding.unwrap_or_else(|| panic!("{fault} is not found as {name}: {findings:#?}"));
+        let others = finding["more"].as_array().into_iter().flatten().chain([&finding["observed"]]);
+        let mut observed = others.filter_map(serde_json::Value::as_str);
+        assert!(observed.any(|observed| observed.contains(what)), "{fault}: {finding:#}");
+        assert_eq!(finding["proof"], "shown", "{fault}: {finding:#}");
+        not_shown_without_fault(&out, name, fmu, fault);
+    }
+}
+
 /// Asserts that a replay does not show a finding in the FMU without the fault. With the fault, the check has already repeated the
 /// calls.
 pub fn not_shown_without_fault(out: &Path, name: &str, fmu: &Path, fault: &str) {
