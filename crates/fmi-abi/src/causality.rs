@@ -1,4 +1,4 @@
-//! Attributes of a variable other than its type (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
+//! Attributes of a variable other than its type (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0), and of its dependencies.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use std::fmt;
 macro_rules! attribute {
     ($(#[$text:meta])* $name:ident { $($(#[$item_text:meta])* $item:ident = $word:literal,)+ }) => {
         $(#[$text])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $name { $($(#[$item_text])* $item,)+ }
 
         impl $name {
@@ -73,5 +73,22 @@ attribute! {
         Approx = "approx",
         /// The first value is calculated.
         Calculated = "calculated",
+    }
+}
+
+attribute! {
+    /// How a known enters the equation of an unknown (`dependenciesKind`, section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0). Each kind states less
+    /// than the ones before it.
+    DependencyKind {
+        /// With a factor that never changes.
+        Constant = "constant",
+        /// With a factor that does not change after the initialization.
+        Fixed = "fixed",
+        /// With a factor that changes only with tunable parameters.
+        Tunable = "tunable",
+        /// With a factor that changes only at events, in Co-Simulation at communication points.
+        Discrete = "discrete",
+        /// In any way.
+        Dependent = "dependent",
     }
 }

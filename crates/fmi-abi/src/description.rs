@@ -2,7 +2,8 @@
 //! standard or stay empty, and each [`Fault`] is listed.
 
 use crate::{
-    BaseType, Causality, Initial, Interface, Standard, Variability, boolean, is_plain_file_name, shown,
+    BaseType, Causality, DependencyKind, Initial, Interface, Standard, Variability, boolean,
+    is_plain_file_name, shown,
 };
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -140,34 +141,6 @@ pub struct Unknown {
     pub dependencies: Option<Vec<usize>>,
     /// `dependenciesKind`, in the order of the dependencies; empty if the attribute is missing or has another length.
     pub kinds: Vec<DependencyKind>,
-}
-
-/// How a known enters the equation of an unknown (`dependenciesKind`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DependencyKind {
-    /// In any way.
-    Dependent,
-    /// With a factor that never changes.
-    Constant,
-    /// With a factor that is fixed after the initialization.
-    Fixed,
-    /// With a factor that changes only with tunable parameters.
-    Tunable,
-    /// With a factor that changes only at events, in Co-Simulation at communication points.
-    Discrete,
-}
-
-impl DependencyKind {
-    /// Returns the kind of this name. An unknown name is read as `Dependent`, the kind that claims least.
-    fn named(name: &str) -> Self {
-        match name {
-            "constant" => Self::Constant,
-            "fixed" => Self::Fixed,
-            "tunable" => Self::Tunable,
-            "discrete" => Self::Discrete,
-            _ => Self::Dependent,
-        }
-    }
 }
 
 /// Capabilities of an FMU for one interface type.
@@ -402,7 +375,9 @@ impl ModelDescription {
             let dependencies: Option<Vec<usize>> =
                 list.map(|list| list.split_whitespace().filter_map(&mut find).collect());
             let kinds = node.attribute("dependenciesKind").unwrap_or_default().split_whitespace();
-            let mut kinds: Vec<DependencyKind> = kinds.map(DependencyKind::named).collect();
+            // A kind with an unknown name is read as the one that states least.
+            let kind = |name| DependencyKind::of_name(name).unwrap_or(DependencyKind::Dependent);
+            let mut kinds: Vec<DependencyKind> = kinds.map(kind).collect();
             if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
                 kinds.clear();
             }

@@ -31,7 +31,7 @@ pub mod write;
 pub mod xml;
 
 pub use base_type::BaseType;
-pub use causality::{Causality, Initial, Variability};
+pub use causality::{Causality, DependencyKind, Initial, Variability};
 pub use log_category::Category;
 pub use mode::{AllowedStates, FmiState, Mode};
 pub use rule::Rule;

@@ -2,8 +2,8 @@
 
 use crate::call_sequence::Kind;
 use crate::rules::Observation;
-pub use fmi_abi::description::{DependencyKind, Offer, Unknown, Variable};
 use fmi_abi::description::{Fault, ModelDescription};
+pub use fmi_abi::description::{Offer, Unknown, Variable};
 use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability, is_c_identifier, shown};
 use std::collections::{HashMap, HashSet};
 use std::ops::Deref;

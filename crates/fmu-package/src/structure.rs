@@ -10,9 +10,8 @@ use crate::model::LoadedModel;
 use crate::sample::{Point, Sampler, is_finite};
 use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
-use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability};
+use fmi_abi::{BaseType, Causality, DependencyKind, Initial, Standard, Value, Variability};
 use std::collections::{HashMap, HashSet};
-use std::fmt;
 
 /// Returns the start values of a model. The first call checks the model.
 ///
@@ -44,31 +43,6 @@ pub struct Unknown {
     pub index: u32,
     /// The indices of the variables that it depends on, each with the kind of dependency.
     pub dependencies: Vec<(u32, DependencyKind)>,
-}
-
-/// The kind of a dependency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum DependencyKind {
-    /// The known is multiplied by a factor that never changes.
-    Constant,
-    /// The known is multiplied by a factor that does not change after the initialization.
-    Fixed,
-    /// The known is multiplied by a factor that changes only with tunable parameters.
-    Tunable,
-    /// Any other dependency.
-    Dependent,
-}
-
-/// The value of `dependenciesKind`.
-impl fmt::Display for DependencyKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Constant => "constant",
-            Self::Fixed => "fixed",
-            Self::Tunable => "tunable",
-            Self::Dependent => "dependent",
-        })
-    }
 }
 
 impl ModelStructure {

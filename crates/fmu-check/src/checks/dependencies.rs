@@ -3,11 +3,11 @@
 use super::derivatives::{middle_values, set_known};
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
-use crate::description::{DependencyKind, Description, Unknown};
+use crate::description::{Description, Unknown};
 use crate::values::{near, other_values};
 use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, number_of, value_of};
-use fmi_abi::Causality;
+use fmi_abi::{Causality, DependencyKind};
 use std::collections::HashSet;
 
 /// Returns the variables of the unknowns whose `dependencies` attribute lists neither the known nor an alias of it. An unknown
@@ -291,7 +291,6 @@ pub fn kinds(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             declared.iter().find_map(|(unknown, kind)| {
                 let [name, known] = [*unknown, known].map(|index| &description.variables[index].name);
                 let [one, other] = unequal_factors(run, &lines, *unknown, *kind, stepped)?;
-                let kind = format!("{kind:?}").to_lowercase();
                 Some(format!(
                     "{known} enters {name} with a factor of {one:?} and of {other:?}, which is declared as {kind}"
                 ))
