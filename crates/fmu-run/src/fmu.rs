@@ -6,11 +6,10 @@ use crate::files::{Files, Kind};
 use crate::library::Library;
 use crate::platform;
 use fmi_abi::description::Offer;
-use fmi_abi::files::Limits;
-use fmi_abi::{Interface, Standard, shown};
-use std::env::consts::{ARCH, DLL_SUFFIX, OS};
+use fmi_abi::files::{Limits, find_library};
+use fmi_abi::{Interface, Standard};
 use std::error::Error as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Name of the file that contains the model description.
@@ -111,7 +110,7 @@ unsafe fn load(
             open it with execution_tool=True, in Rust with open_with_execution_tool";
         return Err(why.to_owned());
     }
-    let file = library_of(files.path(), standard, offer)?;
+    let file = find_library(files.path(), standard, &offer.identifier)?;
     let directory = files.path().join("resources");
     // Section 2.3.1 of FMI 3.0.2 requires NULL if the FMU has no resources. FMUs of FMI 2.0 may read the URI without checking for NULL.
     let has_resources = standard == Standard::Fmi2 || directory.is_dir();
@@ -126,64 +125,4 @@ unsafe fn load(
         });
         format!("its library cannot be loaded: {why}")
     })
-}
-
-/// Returns the names of the directories in `binaries/` that may contain a library for this platform. FMI 2.0 has no names for ARM.
-/// Some FMUs for ARM use the names of FMI 3.0, others the names of FMI 2.0, such as `linux64`, so both are tried.
-fn directories(standard: Standard) -> Vec<String> {
-    let system = if OS == "macos" { "darwin" } else { OS };
-    let tuple = format!("{ARCH}-{system}");
-    let short = match (system, usize::BITS) {
-        ("windows", bits) => format!("win{bits}"),
-        (system, bits) => format!("{system}{bits}"),
-    };
-    match (standard, ARCH) {
-        (Standard::Fmi3, _) => vec![tuple],
-        (Standard::Fmi2, "x86_64" | "x86") => vec![short, tuple],
-        (Standard::Fmi2, _) => vec![tuple, short],
-    }
-}
-
-fn library_of(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
-    let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    let directories = directories(standard);
-    let binaries = directory.join("binaries");
-    if let Some(found) =
-        directories.iter().map(|directory| binaries.join(directory).join(&name)).find(|path| path.is_file())
-    {
-        return Ok(found);
-    }
-    // The name of a directory may also contain the ABI, such as x86_64-linux-gnu (section 2.5.1.4.1 of FMI 3.0).
-    let with_abi =
-        |name: &String| standard == Standard::Fmi3 && name.starts_with(&format!("{}-", directories[0]));
-    let mut others: Vec<_> = std::fs::read_dir(&binaries)
-        .into_iter()
-        .flatten()
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .collect();
-    others.sort();
-    if let Some(found) = others
-        .iter()
-        .filter(|name| with_abi(name))
-        .map(|other| binaries.join(other).join(&name))
-        .find(|path| path.is_file())
-    {
-        return Ok(found);
-    }
-    if others.is_empty() && directory.join("sources").is_dir() {
-        return Err(
-            "has only C sources, which must be compiled first; `fmpy compile FMU` of FMPy does it".to_owned()
-        );
-    }
-    // Names the files in the directories, because a directory for this platform may contain a library with another name.
-    let files = |other: &String| {
-        let entries = std::fs::read_dir(binaries.join(other)).into_iter().flatten().flatten();
-        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut names: Vec<_> = names.map(|name| format!("{}/{}", shown(other), shown(&name))).collect();
-        names.sort();
-        names
-    };
-    let others: Vec<_> = others.iter().flat_map(files).collect();
-    let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
-    Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", directories[0]))
 }

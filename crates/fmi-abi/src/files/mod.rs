@@ -1,10 +1,12 @@
 //! Reads untrusted files: archives of FMUs and systems, and the XML files in them. Only regular files are read, each
 //! up to a limit.
 
+mod binaries;
 mod scratch;
 mod unpack;
 
 use crate::xml::reserve;
+pub use binaries::find_library;
 pub use scratch::Scratch;
 use std::fs::File;
 use std::io::Read;

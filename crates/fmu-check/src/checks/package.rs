@@ -7,7 +7,7 @@ use fmi_abi::files::{self, Entry, Limits};
 use fmi_abi::{Standard, shown};
 use object::Object as _;
 use std::collections::{BTreeSet, HashSet};
-use std::env::consts::{ARCH, DLL_SUFFIX, OS};
+use std::env::consts::{ARCH, OS};
 use std::path::{Path, PathBuf};
 
 /// Unpacks an FMU, and returns the findings in its ZIP file.
@@ -55,40 +55,18 @@ fn check_entry(entry: &Entry, names: &mut HashSet<String>, found: &mut Vec<Obser
     }
 }
 
-/// Returns the names that the directory of this platform in `binaries/` may have, the usual name first.
-fn directories(standard: Standard) -> Vec<String> {
-    let system = if OS == "macos" { "darwin" } else { OS };
-    let tuple = format!("{ARCH}-{system}");
-    let short = format!("{}{}", if system == "windows" { "win" } else { system }, usize::BITS);
-    match (standard, ARCH) {
-        (Standard::Fmi3, _) => vec![tuple],
-        (Standard::Fmi2, "x86_64" | "x86") => vec![short, tuple],
-        (Standard::Fmi2, _) => vec![tuple, short],
-    }
-}
-
 /// Returns the path of the library for this platform.
 ///
 /// # Errors
 /// Fails if the FMU has no library for this platform, or if that library is for another processor or cannot be read.
 pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
-    let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    let expected = directories(standard);
-    let path = |of: &str| directory.join("binaries").join(of).join(&name);
-    let Some(of) = expected.iter().find(|of| path(of).is_file()) else {
-        let binaries = std::fs::read_dir(directory.join("binaries")).into_iter().flatten().flatten();
-        let mut others: Vec<String> =
-            binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        others.sort_unstable();
-        let others = if others.is_empty() { "nothing".to_owned() } else { others.join(", ") };
-        let expected = expected.join(" nor in binaries/");
-        return Err(format!("there is no {name} in binaries/{expected}; binaries has {others}"));
-    };
-    let library = path(of);
+    let library =
+        files::find_library(directory, standard, &offer.identifier).map_err(|why| format!("it {why}"))?;
     let bytes = std::fs::read(&library).map_err(|error| error.to_string())?;
     match object::File::parse(bytes.as_slice()).ok().and_then(|file| machine(&file)) {
         Some(other) if other != ARCH && OS != "macos" => {
-            Err(format!("binaries/{of}/{name} is for {other}, but this machine is {ARCH}"))
+            let path = library.strip_prefix(directory).unwrap_or(&library).display();
+            Err(format!("{path} is for {other}, but this machine is {ARCH}"))
         }
         _ => Ok(library),
     }

@@ -19,9 +19,9 @@ fn nothing_passes_unchecked() {
     type Change = Box<dyn Fn(String) -> String>;
     let cases: [(u32, Change, &str, &str); 4] = [
         (2, Box::new(tool), "co-simulation", "needsExecutionTool"),
-        (2, Box::new(elsewhere), "model-exchange", "there is no cart"),
+        (2, Box::new(elsewhere), "model-exchange", "has no library for this platform"),
         (3, Box::new(scheduled), "scheduled-execution", "Scheduled Execution"),
-        (3, Box::new(neither), both, "there is no cart"),
+        (3, Box::new(neither), both, "has no library for this platform"),
     ];
     for (fmi, change, names, why) in cases {
         let directory = TempDir::new().expect("a directory");
@@ -231,7 +231,7 @@ fn calls_show_it() {
     let elsewhere = |text: String| {
         text.replace("<CoSimulation modelIdentifier=\"wagon", "<CoSimulation modelIdentifier=\"cart")
     };
-    for (fmi, why) in [(2, "there is no cart"), (3, "is not a call of FMI 3.0")] {
+    for (fmi, why) in [(2, "has no library for this platform"), (3, "is not a call of FMI 3.0")] {
         let other = TempDir::new().expect("a directory");
         let path = fmu(other.path(), fmi, &library(&[]), elsewhere);
         let options = ["--fmu", &path.to_string_lossy()];
