@@ -6,8 +6,9 @@ use crate::instance::Instance;
 use crate::model::LoadedModel;
 use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
+use fmi_abi::{BaseType, Causality, Standard, Value, Variability, is_c_identifier};
 use std::collections::HashSet;
+use std::fmt::Display;
 
 /// Start values by index; `None` for a variable without start value.
 pub(crate) type Starts = Vec<Option<Value>>;
@@ -24,15 +25,8 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
     check_smooth(table)?;
     for variable in &table.variables {
         let name = &variable.name;
-        ensure!(
-            is_text(name),
-            "the variable name '{}' is empty or has a line break or another control character",
-            name.escape_debug()
-        );
-        ensure!(
-            is_line(&variable.description),
-            "the description of {name} has a line break or another control character"
-        );
+        check_name("the variable name", name)?;
+        check_line(format_args!("the description of {name}"), &variable.description)?;
         ensure!(
             !table.arrays || is_structured(name),
             "the variable name '{}' is not a name of the structured naming convention, which a model with arrays needs: \
@@ -77,17 +71,20 @@ fn check_smooth(table: &Table) -> Result<()> {
     Ok(())
 }
 
-fn is_line(text: &str) -> bool {
-    !text.chars().any(char::is_control)
+/// Fails if a text is not a single line, because an importer shows it as one.
+pub(crate) fn check_line(label: impl Display, text: &str) -> Result<()> {
+    ensure!(!text.contains(char::is_control), "{label} has a line break or another control character");
+    Ok(())
 }
 
-fn is_text(name: &str) -> bool {
-    !name.is_empty() && is_line(name)
-}
-
-fn is_identifier(text: &str) -> bool {
-    let is_letter = |c: char| c.is_ascii_alphabetic() || c == '_';
-    text.starts_with(is_letter) && text.chars().all(|c| is_letter(c) || c.is_ascii_digit())
+/// Fails if a name is empty or not a single line. The message has the name after the label.
+pub(crate) fn check_name(label: impl Display, name: &str) -> Result<()> {
+    ensure!(
+        !name.is_empty() && !name.contains(char::is_control),
+        "{label} '{}' is empty or has a line break or another control character",
+        name.escape_debug()
+    );
+    Ok(())
 }
 
 /// Whether a name is structured (section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0): `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
@@ -124,7 +121,7 @@ fn is_path(mut rest: &str) -> bool {
             }
             None => {
                 let end = rest.find(['[', '.']).unwrap_or(rest.len());
-                if !is_identifier(&rest[..end]) {
+                if !is_c_identifier(&rest[..end]) {
                     return false;
                 }
                 &rest[end..]
@@ -149,13 +146,9 @@ fn is_positive(value: f64) -> bool {
 }
 
 fn check_info(info: &Info) -> Result<()> {
+    check_name("the model's name", &info.name)?;
     ensure!(
-        is_text(&info.name),
-        "the model's name '{}' is empty or has a line break or another control character",
-        info.name.escape_debug()
-    );
-    ensure!(
-        is_identifier(&info.identifier),
+        is_c_identifier(&info.identifier),
         "the identifier '{}' must be a C identifier: letters, digits and underscores, and not a digit first",
         info.identifier.escape_debug()
     );
@@ -166,7 +159,7 @@ fn check_info(info: &Info) -> Result<()> {
         ("license", &info.license),
         ("copyright", &info.copyright),
     ] {
-        ensure!(is_line(text), "the {fact} of {} has a line break or another control character", info.name);
+        check_line(format_args!("the {fact} of {}", info.name), text)?;
     }
     for (name, value) in [("start time", info.start_time), ("stop time", info.stop_time)] {
         ensure!(value.is_finite(), "the {name} of the default experiment must be finite, it is {value}");
@@ -187,14 +180,10 @@ fn check_info(info: &Info) -> Result<()> {
 }
 
 fn check_type(variable_type: &Type) -> Result<()> {
-    ensure!(is_line(&variable_type.name), "its name has a line break or another control character");
+    check_line("its name", &variable_type.name)?;
     match &variable_type.attributes {
         Attributes::Real { quantity, unit, min, max, nominal } => {
-            ensure!(
-                is_line(quantity),
-                "its quantity '{}' has a line break or another control character",
-                quantity.escape_debug()
-            );
+            check_line(format_args!("its quantity '{}'", quantity.escape_debug()), quantity)?;
             for (name, limit) in [("min", min), ("max", max)] {
                 let limit = limit.map(|limit| rounded(variable_type.base, limit));
                 ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
@@ -216,29 +205,14 @@ fn check_type(variable_type: &Type) -> Result<()> {
             ensure!(!items.is_empty(), "it has no items");
             let (mut names, mut values) = (HashSet::new(), HashSet::new());
             for item in items {
-                ensure!(
-                    is_text(&item.name),
-                    "the item '{}' is empty or has a line break or another control character",
-                    item.name.escape_debug()
-                );
-                ensure!(
-                    is_line(&item.description),
-                    "the description of its item {} has a line break or another control character",
-                    item.name
-                );
+                check_name("the item", &item.name)?;
+                check_line(format_args!("the description of its item {}", item.name), &item.description)?;
                 ensure!(names.insert(&item.name), "it has two items with the name {}", item.name);
                 ensure!(values.insert(item.value), "it has two items with the value {}", item.value);
             }
             Ok(())
         }
-        Attributes::Binary { mime_type, .. } => {
-            ensure!(
-                is_text(mime_type),
-                "its MIME type '{}' is empty or has a line break or another control character",
-                mime_type.escape_debug()
-            );
-            Ok(())
-        }
+        Attributes::Binary { mime_type, .. } => check_name("its MIME type", mime_type),
         _ => Ok(()),
     }
 }
@@ -256,11 +230,7 @@ fn check_unit(unit: &Unit) -> Result<()> {
         unit.display.as_ref().map(|(name, factor, offset)| ("display unit", name, *factor, *offset));
     let own = ("unit", &unit.name, unit.factor, unit.offset);
     for (kind, name, factor, offset) in [own].into_iter().chain(display) {
-        ensure!(
-            is_text(name),
-            "the name '{}' of its {kind} is empty or has a line break or another control character",
-            name.escape_debug()
-        );
+        check_name(format_args!("the name of its {kind}"), name)?;
         ensure!(
             factor.is_finite() && factor != 0.0,
             "the factor of the {kind} {name} must be finite and not 0, it is {factor}"

@@ -1,5 +1,6 @@
 //! Terminals: groups of variables that are connected together (section 2.4.9 of FMI 3.0; section 2.3 of FMI 2.0.4 allows them).
 
+use crate::check::{check_line, check_name};
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
 use crate::model::LoadedModel;
@@ -103,21 +104,12 @@ impl Terminal {
 
     fn check(&self, model: &LoadedModel, content: &[ContentFile]) -> Result<()> {
         for text in [self.kind, self.description] {
-            ensure!(
-                !text.contains(char::is_control),
-                "'{}' has a line break or another control character",
-                text.escape_debug()
-            );
+            check_line(format_args!("'{}'", text.escape_debug()), text)?;
         }
         let mut names = HashSet::new();
         for Member { name, variable, kind } in &self.members {
-            for text in [name, kind] {
-                ensure!(
-                    is_name(text),
-                    "'{}' is empty or has a line break or another control character",
-                    text.escape_debug()
-                );
-            }
+            check_name("the member", name)?;
+            check_name("the kind of a member", kind)?;
             ensure!(names.insert(name), "it has two members with the name {name}");
             let found = model.table.variables.iter().find(|known| known.name == *variable);
             let found =
@@ -169,10 +161,6 @@ impl Terminal {
     }
 }
 
-fn is_name(text: &str) -> bool {
-    !text.is_empty() && !text.contains(char::is_control)
-}
-
 /// Returns `terminalsAndIcons.xml` of a model with these terminals, in an FMU with these files; `None` if there are no terminals.
 ///
 /// # Errors
@@ -186,11 +174,7 @@ pub fn terminals(
     let mut names = HashSet::new();
     for terminal in terminals {
         let name = terminal.name;
-        ensure!(
-            is_name(name),
-            "the terminal '{}' is empty or has a line break or another control character",
-            name.escape_debug()
-        );
+        check_name("the terminal", name)?;
         ensure!(names.insert(name), "there are two terminals with the name {name}");
         terminal.check(model, content).with_context(|| format!("the terminal {name}"))?;
     }

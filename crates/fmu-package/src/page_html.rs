@@ -3,6 +3,8 @@
 
 use crate::content::ContentFile;
 use anyhow::{Context, Result};
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD as BASE64;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use quick_xml::escape::escape;
@@ -91,7 +93,7 @@ impl Resources {
             match space_left.checked_sub(size) {
                 Some(left) => {
                     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-                    resources.packed.insert(name, base64(&deflated(&bytes)?));
+                    resources.packed.insert(name, BASE64.encode(deflated(&bytes)?));
                     space_left = left;
                 }
                 None => resources.missing.push(name),
@@ -109,8 +111,12 @@ fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Re
     scripts.iter().for_each(|script| text += script);
     text += "live([\n";
     for Runnable { description, module } in runnables {
-        let description = base64(&deflated(description.as_bytes())?);
-        writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
+        let description = BASE64.encode(deflated(description.as_bytes())?);
+        writeln!(
+            text,
+            "{{ description: \"{description}\", module: \"{}\" }},",
+            BASE64.encode(deflated(module)?)
+        )?;
     }
     let resources = serde_json::to_string(&(&resources.packed, &resources.missing))?;
     writeln!(text, "], ...{resources}).catch(showFailure);\n}})();")?;
@@ -133,7 +139,7 @@ fn without_comments(script: &str) -> String {
 
 /// Adds a script to the page, in compressed form.
 fn with_script(page: &str, script: &str) -> Result<String> {
-    let packed = base64(&deflated(script.as_bytes())?);
+    let packed = BASE64.encode(deflated(script.as_bytes())?);
     let text = format!(
         "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(showFailure);\n</script>\n"
     );
@@ -151,7 +157,7 @@ fn with_policy(page: &str, compressed: &str) -> String {
         let elements = elements(page, tag);
         let contents = elements.iter().chain(others);
         // Browsers normalize line ends.
-        let hash = |content: &str| base64(&Sha256::digest(content.replace("\r\n", "\n")));
+        let hash = |content: &str| BASE64.encode(Sha256::digest(content.replace("\r\n", "\n")));
         contents.map(|content| format!(" 'sha256-{}'", hash(content))).collect::<String>()
     };
     let policy = format!(
@@ -191,40 +197,9 @@ fn deflated(bytes: &[u8]) -> Result<Vec<u8>> {
     Ok(encoder.finish()?)
 }
 
-/// Encodes bytes in base 64 (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let word =
-            (0..3).fold(0, |word, index| word << 8 | u32::from(chunk.get(index).copied().unwrap_or(0)));
-        for index in 0..4 {
-            let digit = DIGITS[(word >> (18 - 6 * index) & 63) as usize];
-            text.push(if index <= chunk.len() { char::from(digit) } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The examples of RFC 4648, section 10.
-    #[test]
-    fn bytes_in_base_64() {
-        for (bytes, text) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foob", "Zm9vYg=="),
-            ("fooba", "Zm9vYmE="),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(bytes.as_bytes()), text);
-        }
-    }
 
     #[test]
     fn scripts_come_last_in_a_page() {

@@ -40,7 +40,7 @@ fn invalid_terminals_are_rejected() {
         ),
         (
             vec![door().signal("", "power")],
-            "the terminal door: '' is empty or has a line break or another control character",
+            "the terminal door: the member '' is empty or has a line break or another control character",
         ),
         (
             vec![door().signal("a", "power").signal("a", "outside")],
