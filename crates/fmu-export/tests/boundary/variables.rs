@@ -235,7 +235,7 @@ fn out_of_the_range_of_float32() {
     let (fmu, mut value) = (fmi3::Importer::initialized_at::<Palette>(0.0), f32::NAN);
     let twice = reference(Kind::twice as u32);
     fmu.ok(fmu.fmi3GetFloat32(&twice, 1, &mut value, 1));
-    assert_eq!(value, 0.0);
+    assert_eq!(value, 0.2);
     fmu.ok(fmu.fmi3SetFloat32(&reference(Kind::float32 as u32), 1, &f32::MAX, 1));
     fmu.take_log();
     assert_eq!(fmu.fmi3GetFloat32(&twice, 1, &mut value, 1), Status::Error);

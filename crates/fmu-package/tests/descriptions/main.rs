@@ -11,8 +11,9 @@ use fmi_abi::Category;
 use fmi_abi::description::ModelDescription;
 use fmu_export::Exported;
 use fmu_package::{Changes, LoadedModel, Standard, describe};
+use fmu_test_kit::models::Palette;
 use models::breakpoints::{BREAKPOINTS, Breakpoints, LENGTH};
-use models::{branches::Branches, chain::Chain, factors::Factors, room::Room, types::Types};
+use models::{branches::Branches, chain::Chain, factors::Factors, room::Room};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -56,11 +57,11 @@ const EXPECTED: [&str; 10] = [
     "factors-2.xml",
     "factors-3.xml",
     "malformed.txt",
+    "palette-3.xml",
     "room-2.xml",
     "room-3.xml",
     "structures.xml",
     "terminals.xml",
-    "types-3.xml",
 ];
 
 fn directory() -> PathBuf {
@@ -127,10 +128,10 @@ fn kinds_of_factors() {
 
 #[test]
 fn types_that_fmi_2_lacks() {
-    let model = model::<Types>();
-    is_expected("types-3.xml", &described(&model, Standard::Fmi3));
+    let model = model::<Palette>();
+    is_expected("palette-3.xml", &described(&model, Standard::Fmi3));
     let error = describe(&model, Standard::Fmi2, &Changes::default()).unwrap_err().to_string();
-    assert_eq!(error, "single is Float32, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only");
+    assert_eq!(error, "float32 is Float32, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only");
 }
 
 /// Compares only the model structure, because these models differ from others in little else.

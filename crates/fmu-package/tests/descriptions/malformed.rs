@@ -2,10 +2,11 @@
 //! fmu-export.
 
 use crate::models::faulty::{FAULT, Faulty};
-use crate::models::{chain::Chain, factors::Factors, room::Room, types::Types};
+use crate::models::{chain::Chain, factors::Factors, room::Room};
 use crate::{BOTH, changed, is_expected, read_expected};
 use fmu_export::Exported;
 use fmu_package::{Changes, Standard, describe};
+use fmu_test_kit::models::Palette;
 
 /// Returns the error message for a changed model; empty if the model is accepted.
 fn message<M: Exported>(changes: &str, fmi: Standard) -> String {
@@ -34,14 +35,21 @@ fn changed_descriptions() {
                 "Room" => message_in_both::<Room>(line),
                 "Chain" => message_in_both::<Chain>(line),
                 "Factors" => message_in_both::<Factors>(line),
-                _ => message::<Types>(line, Standard::Fmi3),
+                _ => message::<Palette>(line, Standard::Fmi3),
             };
             text += &if message.is_empty() { message } else { format!("    {message}\n") };
         }
     }
     is_expected("malformed.txt", &text);
-    // Only FMI 3.0 needs a variable of this name.
+    // Only FMI 3.0 needs variables of these names.
     assert_eq!(message::<Factors>("variables/u/name=\"time\"", Standard::Fmi2), "");
+    let named = "variables/open/array=\"eventIndicator[1]\"";
+    assert_eq!(message::<Room>(named, Standard::Fmi2), "");
+    assert_eq!(
+        message::<Room>(named, Standard::Fmi3),
+        "eventIndicator[1] is the name of a variable that FMI 3.0 needs; declare it as independent if it is the time, else \
+         rename it"
+    );
 }
 
 #[test]

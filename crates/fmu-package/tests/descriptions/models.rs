@@ -40,46 +40,34 @@ pub mod room {
     const SHARE: Type = Type::integer("Share").max_integer(100);
     const ALARMS: Type = Type::integer("Alarms").min_integer(0);
 
-    #[derive(Clone)]
-    pub struct Room {
-        time: f64,
-        outside: f64,
-        setpoint: f64,
-        heater: Heater,
-        open: bool,
-        comment: String,
-        temperature: f64,
-        guess: f64,
-        alarms: i32,
-        power: f64,
-        label: String,
-        share: i32,
-    }
+    variables! {
+        pub struct Room {
+            time: f64,
+        };
 
-    variables! { for Room;
         /// Time
         time = independent(&TIME);
         /// Outside temperature
-        outside = input(&TEMPERATURE) in outside;
+        outside: f64 = input(&TEMPERATURE).start(10.0);
         /// Requested stage
-        heater = input(&HEATER) in heater;
+        heater: Heater = input(&HEATER).start(Heater::Low);
         /// Whether the window is open
-        open = input(&BOOLEAN) in open;
+        open: bool = input(&BOOLEAN);
         /// Note of the operator
-        comment = input(&STRING) in comment;
+        comment: String = input(&STRING);
         /// Setpoint that changes at communication points only
-        setpoint = input(&TEMPERATURE).discrete() in setpoint;
+        setpoint: f64 = input(&TEMPERATURE).discrete().start(21.0);
         /// Temperature
-        temperature = output(&TEMPERATURE).state().reinit() in temperature;
+        temperature: f64 = output(&TEMPERATURE).state().reinit().start(20.0);
         /// Its rate
         rate as "der(temperature)" = local(&NUMBER).derivative_of(temperature)
             by |room| room.power * f64::from(room.heater.number()) - room.temperature + room.outside;
         /// Temperature of the wall, found from a guess
-        wall = local(&TEMPERATURE).state().approx() in guess;
+        wall: f64 = local(&TEMPERATURE).state().approx().start(15.0);
         /// Its rate
-        wall_rate as "der(wall)" = local(&NUMBER).derivative_of(wall) by |room| room.temperature - room.guess;
+        wall_rate as "der(wall)" = local(&NUMBER).derivative_of(wall) by |room| room.temperature - room.wall;
         /// Alarms so far
-        alarms = output(&ALARMS).exact() in alarms;
+        alarms: i32 = output(&ALARMS).exact().start(3);
         /// Whether it is too warm
         warm = output(&BOOLEAN) by |room| room.temperature > 25.0;
         /// Present stage
@@ -93,15 +81,15 @@ pub mod room {
         /// All base units
         strange = local(&STRANGE).constant() by |_| 0.5;
         /// Power per stage
-        power = parameter(&NUMBER) in power;
+        power: f64 = parameter(&NUMBER).start(1.5);
         /// Double the power
         double = calculated_parameter(&NUMBER) by |room| 2.0 * room.power;
         /// Title of the display
-        label = parameter(&STRING).tunable() in label;
+        label: String = parameter(&STRING).tunable().start("a \"b\"\n< c".into());
         /// Half the share, as it was in the beginning
         half = local(&INTEGER).fixed() by |room| room.share / 2;
         /// Share of the heat that is recovered, %
-        share = parameter(&SHARE) in share;
+        share: i32 = parameter(&SHARE).start(50);
     }
 
     impl Model for Room {
@@ -114,25 +102,8 @@ pub mod room {
             ..Info::new("Room", "room")
         };
 
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self {
-                time: 0.0,
-                outside: 10.0,
-                setpoint: 21.0,
-                heater: Heater::Low,
-                open: false,
-                comment: String::new(),
-                temperature: 20.0,
-                guess: 15.0,
-                alarms: 3,
-                power: 1.5,
-                label: "a \"b\"\n< c".into(),
-                share: 50,
-            })
-        }
-
         fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
-            self.guess = 0.5 * (self.temperature + self.outside);
+            self.wall = 0.5 * (self.temperature + self.outside);
             Ok(())
         }
 
@@ -155,10 +126,10 @@ pub mod room {
         |room, size| {
             let rates = [
                 room.power * f64::from(room.heater.number()) - room.temperature + room.outside,
-                room.temperature - room.guess,
+                room.temperature - room.wall,
             ];
             room.temperature += size * rates[0];
-            room.guess += size * rates[1];
+            room.wall += size * rates[1];
         };
         VARIABLE_STEP_SIZE: bool = false; EVENTS: Events = Events::StopIfHandled; }
     }
@@ -178,112 +149,6 @@ pub mod room {
     offer!(Room: ModelExchange + CoSimulation + InputDerivatives + OutputDerivatives);
 }
 
-/// The types that only FMI 3.0 has, a time that is not a variable of the model, and a derivative that is a state.
-pub mod types {
-    use super::*;
-
-    const SINGLE: Type = Type::float32("Single", &units::ONE).max(0.1);
-    const BYTE: Type = Type::whole("Byte", BaseType::UInt8).max_integer(200);
-    const SMALL: Type = Type::whole("", BaseType::Int8);
-    const SHORT: Type = Type::whole("", BaseType::Int16);
-    const PORT: Type = Type::whole("", BaseType::UInt16);
-    const COUNT: Type = Type::whole("", BaseType::UInt32);
-    const LONG: Type = Type::whole("", BaseType::Int64);
-    const HUGE: Type = Type::whole("Huge", BaseType::UInt64).min_integer(1);
-    const IMAGE: Type = Type::binary("Image", "image/png").max_size(4);
-
-    #[derive(Clone)]
-    pub struct Types {
-        time: f64,
-        single: f32,
-        small: i8,
-        byte: u8,
-        short: i16,
-        port: u16,
-        count: u32,
-        long: i64,
-        huge: u64,
-        image: Vec<u8>,
-        angle: f64,
-        speed: f64,
-    }
-
-    variables! { for Types;
-        /// Single precision
-        single = input(&SINGLE) in single;
-        /// Twice that
-        double = output(&SINGLE) by |model| 2.0 * model.single;
-        /// Eight bits
-        small = parameter(&SMALL) in small;
-        /// Eight bits without sign
-        byte = input(&BYTE) in byte;
-        /// Sixteen bits
-        short = parameter(&SHORT) in short;
-        /// Sixteen bits without sign
-        port = parameter(&PORT).tunable() in port;
-        /// 32 bits without sign
-        count = output(&COUNT).exact() in count;
-        /// 64 bits
-        long = parameter(&LONG) in long;
-        /// 64 bits without sign
-        huge = parameter(&HUGE) in huge;
-        /// Bytes
-        image = input(&IMAGE) in image;
-        /// The same bytes
-        copy = output(&IMAGE) by |model| model.image.clone();
-        /// Sine of the time
-        wave = output(&NUMBER) by |model| model.time.sin();
-        /// Angle
-        angle = local(&NUMBER).state() in angle;
-        /// Its derivative, which is also a state
-        speed = output(&NUMBER).state().derivative_of(angle) in speed;
-        /// The derivative of the speed
-        acceleration = local(&NUMBER).derivative_of(speed) by |model| -model.angle;
-    }
-
-    impl Model for Types {
-        const INFO: Info = Info::new("Types", "types");
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self {
-                time: 0.0,
-                single: 0.1,
-                small: -128,
-                byte: 3,
-                short: -5,
-                port: 65535,
-                count: 4_000_000_000,
-                long: i64::MIN,
-                huge: u64::MAX,
-                image: vec![0, 0xAB],
-                angle: 1.0,
-                speed: 0.0,
-            })
-        }
-
-        fn calculate(&mut self, time: f64) {
-            self.time = time;
-        }
-    }
-
-    impl ModelExchange for Types {
-        const INDICATORS: usize = 2;
-
-        fn indicators(&self, indicators: &mut [f64]) {
-            indicators.fill(0.0);
-        }
-    }
-
-    impl CoSimulation for Types {
-        step! {
-            |model, size| [model.angle, model.speed] = [model.angle + size * model.speed, model.speed - size * model.angle];
-            EVENTS: Events = Events::Stop;
-        }
-    }
-
-    offer!(Types: ModelExchange + CoSimulation);
-}
-
 /// Dependencies with factors that are constant, fixed, or neither.
 pub mod factors {
     use super::*;
@@ -291,23 +156,14 @@ pub mod factors {
     const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
     const COUNT: Type = Type::integer("Count").min_integer(-9).max_integer(3);
 
-    #[derive(Clone)]
-    pub struct Factors {
-        u: f64,
-        v: f64,
-        x: f64,
-        p: f64,
-        n: i32,
-        b: bool,
-    }
-
-    variables! { for Factors;
+    variables! {
+        pub struct Factors;
         /// Input
-        u = input(&NUMBER) in u;
+        u: f64 = input(&NUMBER);
         /// Input with <signs> & "quotes"
-        v = input(&NUMBER) in v;
+        v: f64 = input(&NUMBER);
         /// State
-        x = output(&NUMBER).state() in x;
+        x: f64 = output(&NUMBER).state().start(2.0);
         /// 3 u - p x
         der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |model| 3.0 * model.u - model.p * model.x;
         /// 2 u + n x
@@ -317,11 +173,11 @@ pub mod factors {
         /// Five; the input cancels, up to rounding
         five = output(&NUMBER) by |model| (model.u / 3.0 + 5.0) - model.u / 3.0;
         /// Real parameter
-        p = parameter(&SHARE) in p;
+        p: f64 = parameter(&SHARE).start(0.1);
         /// Integer parameter
-        n = parameter(&COUNT) in n;
+        n: i32 = parameter(&COUNT).start(1);
         /// Boolean parameter
-        b = parameter(&BOOLEAN) in b;
+        b: bool = parameter(&BOOLEAN).start(true);
     }
 
     impl Model for Factors {
@@ -335,10 +191,6 @@ pub mod factors {
             smooth: true,
             ..Info::new("Factors", "factors")
         };
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self { u: 0.0, v: 0.0, x: 2.0, p: 0.1, n: 1, b: true })
-        }
 
         fn update(&mut self) -> Result<(), Error> {
             match self.p < f64::from(self.n) / 20.0 {
@@ -391,37 +243,26 @@ pub mod chain {
     const LIMIT: Type = Type::real("Limit", &units::ONE).min(-50.0);
     const COUNT: Type = Type::integer("Count").min_integer(0).max_integer(9);
 
-    #[derive(Clone)]
-    pub struct Chain {
-        x: [f64; 2],
-        u: [f64; 2],
-        p: f64,
-        ends: [End; 2],
-        limits: [[f64; 2]; 2],
-        moved: [bool; 2],
-        counted: [i32; 2],
-        labels: [String; 2],
-    }
-
-    variables! { for Chain;
+    variables! {
+        pub struct Chain;
         /// States
-        x = output(&NUMBER).state() in x;
+        x: [f64; 2] = output(&NUMBER).state().start([1.0, 2.0]);
         /// u[1]; p * x[1] + sin(u[2])
         der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |c| [c.u[0], c.p * c.x[0] + c.u[1].sin()];
         /// Inputs
-        u = input(&NUMBER) in u;
+        u: [f64; 2] = input(&NUMBER).start([0.5, 0.25]);
         /// Parameter
-        p = parameter(&NUMBER) in p;
+        p: f64 = parameter(&NUMBER).start(3.0);
         /// Kinds of the ends
-        ends = input(&END) in ends;
+        ends: [End; 2] = input(&END).start([End::Fixed, End::Free]);
         /// Limits of the states
-        limits = parameter(&LIMIT) in limits;
+        limits: [[f64; 2]; 2] = parameter(&LIMIT).start([[10.0, 25.0], [12.5, 30.0]]);
         /// Whether the states have moved
-        moved = output(&BOOLEAN).exact().depends_on() in moved;
+        moved: [bool; 2] = output(&BOOLEAN).exact().depends_on().start([true, false]);
         /// Numbers
-        counted = parameter(&COUNT) in counted;
+        counted: [i32; 2] = parameter(&COUNT).start([1, 2]);
         /// Labels of the ends
-        labels = parameter(&STRING) in labels;
+        labels: [String; 2] = parameter(&STRING).start(["the <left> end".to_owned(), "the right end".to_owned()]);
         /// Reports on the ends
         reports = output(&STRING).depends_on(&[ends, labels])
             by |c| [0, 1].map(|i| format!("{}{}", c.labels[i], c.ends[i] == End::Fixed));
@@ -429,19 +270,6 @@ pub mod chain {
 
     impl Model for Chain {
         const INFO: Info = Info { smooth: true, ..Info::new("Chain", "chain") };
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self {
-                x: [1.0, 2.0],
-                u: [0.5, 0.25],
-                p: 3.0,
-                ends: [End::Fixed, End::Free],
-                limits: [[10.0, 25.0], [12.5, 30.0]],
-                moved: [true, false],
-                counted: [1, 2],
-                labels: ["the <left> end".to_owned(), "the right end".to_owned()],
-            })
-        }
 
         fn update(&mut self) -> Result<(), Error> {
             match self.limits.iter().all(|[low, high]| low <= high) {
@@ -486,26 +314,16 @@ pub mod chain {
 pub mod branches {
     use super::*;
 
-    #[derive(Clone, Default)]
-    pub struct Branches {
-        u: f64,
-        v: f64,
-        sum: f64,
-        gain: f64,
-        stepped: bool,
-    }
+    variables! {
+        pub struct Branches {
+            sum: f64,
+            stepped: bool,
+        }, memory in sum, stepped;
 
-    impl Branches {
-        fn above(&self) -> f64 {
-            if self.u > 10.0 { self.u } else { 0.0 }
-        }
-    }
-
-    variables! { for Branches, memory in sum, stepped;
         /// Input
-        u = input(&NUMBER) in u;
+        u: f64 = input(&NUMBER);
         /// Input
-        v = input(&NUMBER) in v;
+        v: f64 = input(&NUMBER);
         /// u if it is above 10, else 0
         above = output(&NUMBER) by |model| model.above();
         /// u limited to -100 to 100, plus v after the first step
@@ -518,15 +336,17 @@ pub mod branches {
         /// One
         timed = output(&NUMBER).depends_on(&[Index::TIME]) by |_| 1.0;
         /// Factor
-        gain = parameter(&NUMBER) in gain;
+        gain: f64 = parameter(&NUMBER).start(1.0);
+    }
+
+    impl Branches {
+        fn above(&self) -> f64 {
+            if self.u > 10.0 { self.u } else { 0.0 }
+        }
     }
 
     impl Model for Branches {
         const INFO: Info = Info::new("Branches", "branches");
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self { gain: 1.0, ..Self::default() })
-        }
     }
 
     impl CoSimulation for Branches {
@@ -563,27 +383,18 @@ pub mod breakpoints {
         pub static BREAKPOINTS: RefCell<([f64; LENGTH], bool)> = const { RefCell::new(([0.0; LENGTH], false)) };
     }
 
-    #[derive(Clone)]
-    pub struct Breakpoints {
-        u: f64,
-        x: [f64; LENGTH],
-    }
-
-    variables! { for Breakpoints;
+    variables! {
+        pub struct Breakpoints;
         /// Input
-        u = input(&NUMBER) in u;
+        u: f64 = input(&NUMBER).start(1.0);
         /// Breakpoints
-        x = parameter(&NUMBER) in x;
+        x: [f64; LENGTH] = parameter(&NUMBER).start(BREAKPOINTS.with_borrow(|(start, _)| *start));
         /// Sum of the breakpoints, times the input
         y = output(&NUMBER) by |model| model.u * model.x.iter().sum::<f64>();
     }
 
     impl Model for Breakpoints {
         const INFO: Info = Info { smooth: true, ..Info::new("Breakpoints", "breakpoints") };
-
-        fn new(_: &Setup) -> Result<Self, Error> {
-            Ok(Self { u: 1.0, x: BREAKPOINTS.with_borrow(|(start, _)| *start) })
-        }
 
         fn update(&mut self) -> Result<(), Error> {
             let fits = match BREAKPOINTS.with_borrow(|(_, even)| *even) {
@@ -614,18 +425,15 @@ pub mod faulty {
         FAULT.with_borrow(|present| *present == fault)
     }
 
-    #[derive(Clone)]
-    pub struct Faulty {
-        u: f64,
-        label: String,
-        time: f64,
-    }
+    variables! {
+        pub struct Faulty {
+            time: f64,
+        };
 
-    variables! { for Faulty;
         /// Input
-        u = input(&NUMBER) in u;
+        u: f64 = input(&NUMBER);
         /// Label
-        label = parameter(&STRING) in label;
+        label: String = parameter(&STRING);
         /// Square of the input, plus the time
         y = output(&NUMBER).depends_on(&[u, Index::TIME]) by |model| {
             assert!(!has("unreadable"));
