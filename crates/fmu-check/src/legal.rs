@@ -72,9 +72,9 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
             }
             // If the steps are allowed twice in a row, they are allowed any number of times.
             Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
-            // Threads do not share instances, so each sequence is checked separately.
+            // Threads that run at the same time do not share instances, so one sequence may be checked after another.
             Step::Parallel(sequences) => {
-                sequences.iter().all(|sequence| first_illegal(description, sequence).is_none())
+                sequences.iter().all(|sequence| walk(description, sequence, objects).is_none())
             }
             Step::FreshProcess => {
                 objects.instances.clear();
@@ -87,7 +87,8 @@ fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects)
                 is_here && state.mode == Mode::ContinuousTime
             }),
             Step::Unload | Step::Quit => objects.instances.is_empty(),
-            Step::Version(_) | Step::Measure | Step::Elsewhere(_) | Step::Copies(..) => true,
+            Step::Version(_) | Step::Measure | Step::Copies(..) => true,
+            Step::Elsewhere(_) | Step::Environment => true,
         };
         if !is_legal {
             return Some(*id);

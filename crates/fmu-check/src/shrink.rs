@@ -41,8 +41,8 @@ fn content(step: &Step) -> Option<String> {
         }
         Step::Integrate(_, how) => Some(format!("{how:?}")),
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
-        Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Elsewhere(_) => None,
-        Step::Unload | Step::Quit | Step::Copies(..) => None,
+        Step::Make(..) | Step::Free(_) | Step::FreshProcess => None,
+        Step::Elsewhere(_) | Step::Environment | Step::Unload | Step::Quit | Step::Copies(..) => None,
     }
 }
 
@@ -80,8 +80,8 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 }
 
 /// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
-/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess` and
-/// `Elsewhere`. If `compared` is set, corresponding calls of compared simulations are removed together. The search ends when
+/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess`,
+/// `Elsewhere` and `Environment`. If `compared` is set, corresponding calls of compared simulations are removed together. The search ends when
 /// `reproduces` returns `None`.
 pub fn shrink(
     description: &Description,
@@ -100,7 +100,7 @@ pub fn shrink(
     let mut units = if compared { together(sequence, all) } else { all };
     let stays = |step: &Step| match step {
         Step::Call { function, .. } => pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name)),
-        Step::FreshProcess | Step::Elsewhere(_) => !pinned.is_empty(),
+        Step::FreshProcess | Step::Elsewhere(_) | Step::Environment => !pinned.is_empty(),
         _ => false,
     };
     let all = all_steps(sequence).into_iter().filter(|numbered| stays(&numbered.step));

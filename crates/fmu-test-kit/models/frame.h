@@ -365,7 +365,8 @@ static int initialize(void *c, double from, double stop) {
     return enter(f, INITIALIZATION);
 }
 
-static int do_step(void *c, double point, double size) {
+static int do_step(void *c, double point, double size, bool no_set) {
+    if (c && no_set && IS(announcement_counts)) *states_of(c) += 1e-6;
     int status;
     ALLOW(STEP)
     if (IS(endless_step) && !(size < 1e9)) for (;;) usleep(1000);
@@ -507,6 +508,7 @@ int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const *categories
     ALLOW(ANY)
     NEED(!n || categories, "an array is NULL")
     for (size_t i = 0; i < n; i++) NEED(categories[i] && !strcmp(categories[i], "logStatusError"), "an unknown category")
+    if (IS(logging_switched) && f->mode > INITIALIZATION) *states_of(c) += 1e-6;
     f->logging = on;
     return OK;
 }
@@ -656,7 +658,7 @@ int fmi2CompletedIntegratorStep(void *c, int no_set, int *event, int *terminate)
     f->steps++, *event = wants, *terminate = 0;
     return status;
 }
-int fmi2DoStep(void *c, double point, double size, int no_set) { (void)no_set; return do_step(c, point, size); }
+int fmi2DoStep(void *c, double point, double size, int no_set) { return do_step(c, point, size, no_set); }
 int fmi2GetRealStatus(void *c, int kind, double *value) { ALLOW(STEP | ENDED) if (kind != 2) return DISCARD; *value = f->last; return OK; }
 int fmi2GetBooleanStatus(void *c, int kind, int *value) { ALLOW(STEP | ENDED) if (kind != 3) return DISCARD; *value = f->ended; return OK; }
 #define ACCESS2(name, type, kind)                                                                                                           \
@@ -701,9 +703,8 @@ int fmi3CompletedIntegratorStep(void *c, bool no_set, bool *event, bool *termina
 }
 int fmi3DoStep(void *c, double point, double size, bool no_set, bool *event, bool *terminate, bool *early, double *last) {
     Fmu *f = (Fmu *)c;
-    (void)no_set;
     if (c) NEED(event && terminate && early && last, "a flag is NULL")
-    int status = do_step(c, point, size);
+    int status = do_step(c, point, size, no_set);
     if (status <= DISCARD) *event = f->event, *terminate = f->ended, *early = f->returned_early, *last = f->last;
     return status;
 }

@@ -20,12 +20,14 @@ struct Model {
     int count, fast, updates_needed, restored;
     char label[32];
     double shown;
+    char directory[4096];
 };
 
 extern int missing_symbol(void);
 
 static double shared_v, racing;
 static int runs, alive;
+static __thread double of_thread;
 
 static double slope(const Model *m) {
     bool ignored = IS(start_in_mode_ignored);
@@ -66,7 +68,7 @@ static void attack(void) {
 static void *idle(void *nothing) { pause(); return nothing; }
 
 static int begin(Model *m, const char *token, const char *resources) {
-    (void)m, (void)token, (void)resources;
+    (void)token, (void)resources;
     if (IS(environment_changed)) setenv("OMP_NUM_THREADS", "1", 1);
     if (IS(mask_changed)) umask(0);
     if (IS(limit_changed)) { struct rlimit none = {0, 0}; getrlimit(RLIMIT_NOFILE, &none); none.rlim_cur = 200; setrlimit(RLIMIT_NOFILE, &none); }
@@ -76,6 +78,8 @@ static int begin(Model *m, const char *token, const char *resources) {
     if (IS(thread_left)) { pthread_t thread; if (!pthread_create(&thread, NULL, idle, NULL)) pthread_detach(thread); }
     if (IS(pool_of_eight) && alive >= 8) return ERROR;
     alive++;
+    of_thread = IS(thread_in_result);
+    if (IS(directory_in_result) && !getcwd(m->directory, sizeof m->directory)) return ERROR;
     return IS(second_run_rejected) && runs++ > 300 ? ERROR : OK;
 }
 
@@ -88,8 +92,10 @@ static void set_start(Model *m) {
 
 static bool place(Model *m, Kind kind, uint32_t vr, Place *to) {
     Fmu *f = &m->fmu;
-    double y = 2 * m->force + m->x + *f->scratch * 1e-3;
+    double y = 2 * m->force + m->x + *f->scratch * 1e-3 + of_thread + 1e-9 * (double)strlen(m->directory);
     (void)kind;
+    if (IS(home_in_result)) y += 1e-9 * (double)strlen(getenv("HOME") ? getenv("HOME") : "");
+    if (IS(values_end) && f->mode == ENDED) y = 0;
     if (IS(address_in_result)) y += (double)((uintptr_t)m >> 12 & 0xfff) * 1e-9;
     switch (vr) {
     case MASS: return at_finite(to, &m->mass, FIXED, 5e-324);
@@ -123,6 +129,7 @@ static bool place(Model *m, Kind kind, uint32_t vr, Place *to) {
 
 static bool take(Model *m, uint32_t vr, const void *value) {
     if (vr == SPRING && m->fmu.mode == START) m->first_spring = *(const double *)value;
+    if (vr == MASS && IS(set_changes_other)) m->spring = 40;
     return !(vr == DAMPER && IS(set_ignored));
 }
 

@@ -183,6 +183,8 @@ pub enum Step {
     FreshProcess,
     /// Places the FMU in a directory with this name. It can only be the first step of a process, because the library is loaded from there.
     Elsewhere(String),
+    /// Uses another working directory, home directory, language and time zone. It can only be the first step of a process.
+    Environment,
     Unload,
     /// Exits the process, which runs the destructors of its libraries. This is the last step of a sequence.
     Quit,
@@ -235,6 +237,7 @@ pub fn step_name(step: &Step) -> String {
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
         Step::Elsewhere(_) => "another directory".to_owned(),
+        Step::Environment => "another environment".to_owned(),
         Step::Unload => "unloading the library".to_owned(),
         Step::Quit => "the exit of the process".to_owned(),
     }

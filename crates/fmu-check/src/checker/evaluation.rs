@@ -60,6 +60,13 @@ impl Checker {
         self.differ_by(0.0, one, other, message)
     }
 
+    /// Returns the reads of numbers and vectors, without those of strings and bytes.
+    pub fn numeric(&self, mut reads: Vec<Read>) -> Vec<Read> {
+        let is_number = |(index, _): &(usize, usize)| self.description.variables[*index].is_number();
+        reads.retain(|read| read.variables.iter().all(is_number));
+        reads
+    }
+
     /// Returns a criterion like `differ`, which allows relative differences up to `tolerance`.
     fn differ_by(
         &self,

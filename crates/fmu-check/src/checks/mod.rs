@@ -33,6 +33,7 @@ pub mod states;
 pub mod status;
 pub mod step_derivatives;
 pub mod strings;
+pub mod surroundings;
 pub mod vectors;
 
 use crate::call_sequence::CallSequence;
@@ -122,6 +123,11 @@ pub const ALL: &[(&str, Check)] = &[
     ("results", Each(Always, location::location)),
     ("results", Each(Always, results::reading)),
     ("results", Each(Always, results::arguments)),
+    ("results", Each(Always, surroundings::environment)),
+    ("results", Each(Always, surroundings::other_thread)),
+    ("results", Each(Always, surroundings::no_earlier_state)),
+    ("results", Each(Always, surroundings::logging)),
+    ("results", Each(Always, surroundings::terminated)),
     ("results", Each(Stepped3, early_returns::steps)),
     ("results", Each(Several, results::threads)),
     ("results", Each(Several, strings::threads)),

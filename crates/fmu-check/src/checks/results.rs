@@ -36,15 +36,13 @@ const ARGUMENTS: [Argument; 3] = [
 
 /// Checks that an instance with other [`ARGUMENTS`] has the same results. Strings are not compared, because they may contain the name.
 pub fn arguments(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let is_number = |(index, _): &(usize, usize)| checker.description.variables[*index].is_number();
     for (rule, message, change) in ARGUMENTS {
         let mut writer = checker.writer(trajectory);
         let [usual, changed] = [|_: &mut Make| {}, change].map(|change| {
             writer.make_with(0, change);
-            let mut reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
+            let reads = writer.write(0, &[Part::Enter, Part::Leave, ReadAll, RunFrom(0)]).reads;
             writer.free(0);
-            reads.retain(|read| read.variables.iter().all(is_number));
-            reads
+            checker.numeric(reads)
         });
         let criterion = checker.differ(&usual, &changed, message);
         checker.check(rule, writer.sequence, criterion)?;

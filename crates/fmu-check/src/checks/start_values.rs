@@ -192,7 +192,9 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     if !near.is_empty() {
         same_effect(checker, trajectory, &near)?;
     }
-    for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(separate) {
+    // In reverse order, too, because setting one variable must not change another.
+    let backward = near.iter().rev().cloned().collect();
+    for values in [near, backward].into_iter().filter(|near| !near.is_empty()).chain(separate) {
         for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
             read_back(checker, trajectory, before, values.clone(), after)?;
         }

@@ -86,6 +86,9 @@ impl Printed<'_> {
                 "continue in a new process, which gets only the serialized states".to_owned()
             }
             Step::Elsewhere(name) => format!("use the FMU through the directory {name:?}"),
+            Step::Environment => {
+                "use another working directory, home directory, language and time zone".to_owned()
+            }
             Step::Unload => "unload the library".to_owned(),
             Step::Quit => "exit(0)".to_owned(),
             Step::Repeat(..) | Step::Parallel(_) | Step::Copies(..) => String::new(),

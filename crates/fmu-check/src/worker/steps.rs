@@ -134,6 +134,7 @@ impl Executor {
             | Step::Parallel(_)
             | Step::FreshProcess
             | Step::Elsewhere(_)
+            | Step::Environment
             | Step::Copies(..) => {}
         }
     }

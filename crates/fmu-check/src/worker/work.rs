@@ -38,6 +38,10 @@ pub fn work(job: Job, file: File) {
     }
     let setting = match job.sequence.first().map(|numbered| &numbered.step) {
         Some(Step::Elsewhere(name)) => elsewhere(&job.setting, name),
+        Some(Step::Environment) => {
+            change_environment();
+            job.setting
+        }
         _ => job.setting,
     };
     let executor = Executor {
@@ -61,14 +65,34 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let there = std::env::current_dir().unwrap_or_default().join(name);
     #[cfg(unix)]
     if let Err(error) = std::os::unix::fs::symlink(directory, &there) {
-        eprintln!("{}: {error}", there.display());
-        std::process::exit(OWN_FAULT);
+        fail(&there, &error);
     }
     let moved = |path: &Path| there.join(path.strip_prefix(directory).unwrap_or(path));
     Setting {
         libraries: setting.libraries.clone().map(|library| library.map(|library| moved(&library))),
         resources: moved(&setting.resources),
         ..setting.clone()
+    }
+}
+
+/// Ends the process because of a fault that is not the FMU's.
+fn fail(path: &Path, error: &std::io::Error) -> ! {
+    eprintln!("{}: {error}", path.display());
+    std::process::exit(OWN_FAULT)
+}
+
+/// Creates a directory, in which the process continues, and which is its home directory. Changes the language and the time zone, too.
+fn change_environment() {
+    let directory = std::env::current_dir().unwrap_or_default().join("another directory");
+    let created = std::fs::create_dir(&directory).and_then(|()| std::env::set_current_dir(&directory));
+    if let Err(error) = created {
+        fail(&directory, &error);
+    }
+    let directory = directory.to_string_lossy();
+    let german = "de_DE.UTF-8";
+    for (name, value) in [("HOME", &*directory), ("LANG", german), ("LC_ALL", german), ("TZ", "XYZ-7")] {
+        // SAFETY: this process has one thread.
+        unsafe { std::env::set_var(name, value) };
     }
 }
 

@@ -167,6 +167,13 @@ mutants! {
     3 log_file_left "resources" "resources.settings";
     2 slope_off "results" "results.interfaces";
     3 counts_twice "results" "results.interfaces";
+    2 home_in_result "results" "results.environment";
+    3 directory_in_result "results" "results.environment";
+    3 thread_in_result "results" "results.other-thread";
+    2 values_end "results" "results.terminated";
+    3 logging_switched "results" "results.logging";
+    2 announcement_counts "results" "results.no-earlier-state";
+    3 set_changes_other "start_values" "start_values.set";
 }
 
 #[test]
