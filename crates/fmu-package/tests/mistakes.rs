@@ -142,6 +142,32 @@ fn events_declare_that_they_change_states() {
     rejects("cart", "hit and reported", "2", &[" v was ", "`.reinit()`"]);
 }
 
+/// What is probably a mistake, although the standard allows it, is a warning: with such strong friction, the damping does not act.
+#[test]
+fn probable_mistakes_are_warnings() {
+    let directory = package("cart");
+    let warnings = |difference: &str| {
+        let (succeeds, errors) = build(directory.path(), "cart", difference, "3");
+        assert!(succeeds, "{errors}");
+        errors
+    };
+    let stiff = warnings("stiff");
+    for warning in [
+        "warning: in the simulations of this check, d changes no value, no derivative and no event; use it or remove it",
+        "warning: omega is 1.0 for all values of the parameters that were tried; calculate it from parameters",
+    ] {
+        assert!(stiff.contains(warning), "{stiff}");
+    }
+    let reported = warnings("jump and reported");
+    assert!(
+        reported.contains("warning: each update reports changed states")
+            && reported.contains("; `event` must check")
+    );
+    let usual = warnings("");
+    let rules = ["no-effect", "calculated-parameter", "counted-entry"];
+    assert!(!rules.iter().any(|rule| usual.contains(rule)), "{usual}");
+}
+
 #[test]
 fn derivatives_equal_differences_of_the_values() {
     for fmi in ["2", "3"] {

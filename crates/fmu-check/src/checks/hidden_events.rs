@@ -9,6 +9,7 @@ use crate::trajectory::step_size;
 use crate::values::inputs_by;
 use crate::writer::{Point, Read, Trajectory, Writer, value_of};
 use fmi_abi::{Causality, Variability};
+use std::sync::Arc;
 
 /// Number of intervals of the integration.
 const INTERVALS: usize = 40;
@@ -118,14 +119,17 @@ fn unannounced_change(
 struct TwoEntries {
     time: f64,
     is_event: bool,
+    /// Numbers of the updates of the discrete states.
+    updates: [u32; 2],
     reads: [Vec<Read>; 3],
 }
 
-/// Checks that an event is handled once: entering Event Mode again at the same time changes no discrete variable.
+/// Checks that an event is handled once: entering Event Mode again at the same time changes no discrete variable. Also looks for a variable
+/// that changes, or an update that reports changed states, whenever Event Mode is entered.
 pub fn repeated(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    let variables = discrete(checker);
-    if variables.is_empty() {
+    let variables = Arc::new(discrete(checker));
+    if variables.is_empty() && description.states_count() == 0 {
         return Ok(());
     }
     let trajectory = &integrate_with_events(checker, trajectory)?.trajectory;
@@ -135,16 +139,67 @@ pub fn repeated(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
     for point in &trajectory.points {
         writer.point(0, &Point { event: false, ..point.clone() });
         let before = writer.read(0);
-        let [first, second] = [(); 2].map(|()| {
-            writer.event(0);
-            writer.read(0)
+        let [(first_update, first), (second_update, second)] =
+            [(); 2].map(|()| (writer.event(0)[1], writer.read(0)));
+        let updates = [first_update, second_update];
+        all.push(TwoEntries {
+            time: point.time,
+            is_event: point.event,
+            updates,
+            reads: [before, first, second],
         });
-        all.push(TwoEntries { time: point.time, is_event: point.event, reads: [before, first, second] });
     }
-    let description = description.clone();
-    checker.check("dynamics.repeated-event", writer.sequence, move |run| {
-        variables.iter().find_map(|variable| changes_again(run, &description, &all, *variable))
-    })
+    let all = Arc::new(all);
+    let repeated = {
+        let (description, all, variables) = (description.clone(), all.clone(), variables.clone());
+        move |run: &Run| {
+            variables.iter().find_map(|variable| changes_again(run, &description, &all, *variable))
+        }
+    };
+    let run = checker.evaluate("dynamics.repeated-event", writer.sequence.clone(), repeated)?;
+    let (description, fmi3) = (description.clone(), checker.fmi3());
+    checker.record("dynamics.counted-entry", &run, &writer.sequence, move |run| {
+        let elsewhere: Vec<&TwoEntries> = all.iter().filter(|point| !point.is_event).collect();
+        if elsewhere.len() < LEAST_POINTS {
+            return None;
+        }
+        let counts =
+            variables.iter().find_map(|variable| counts_entries(run, &description, &elsewhere, *variable));
+        counts.or_else(|| {
+            let reports = |id: &u32| event(run, *id, fmi3).is_some_and(|event| event.states_changed);
+            let always = elsewhere.iter().all(|point| point.updates.iter().all(reports));
+            always.then(|| {
+                "each update reports changed states, also if Event Mode is entered again at the same time"
+                    .to_owned()
+            })
+        })
+    });
+    Ok(())
+}
+
+/// Minimum number of points without an event at which a variable must change.
+const LEAST_POINTS: usize = 3;
+
+/// Describes a variable that changes whenever Event Mode is entered at these points.
+fn counts_entries(
+    run: &Run,
+    description: &Description,
+    points: &[&TwoEntries],
+    variable: usize,
+) -> Option<String> {
+    let mut first_change = None;
+    for point in points {
+        let [before, first, second] = point.reads.each_ref().map(|reads| value_of(run, reads, variable));
+        let (before, first, second) = (before?, first?, second?);
+        let at = before.differ(&first)?;
+        first.differ(&second)?;
+        first_change.get_or_insert_with(|| (point.time, [before.show(at), first.show(at), second.show(at)]));
+    }
+    let (time, [before, first, second]) = first_change?;
+    let name = &description.variables[variable].name;
+    Some(format!(
+        "{name} changes whenever Event Mode is entered, although there is no event: at {time:?} from {before} to {first}, and again to {second}"
+    ))
 }
 
 /// Describes an event in which a variable changes, and changes again when Event Mode is entered again.

@@ -5,6 +5,7 @@ pub mod derivatives;
 pub mod differences;
 pub mod directional;
 pub mod early_returns;
+pub mod effects;
 pub mod event_inputs;
 pub mod functions;
 pub mod hidden_events;
@@ -144,6 +145,8 @@ pub const ALL: &[(&str, Check)] = &[
     ("dynamics", Each(Integrated, hidden_events::unannounced)),
     ("dynamics", Each(Integrated, hidden_events::repeated)),
     ("dynamics", Each(Always, start_times::starts)),
+    ("start_values", Once(effects::parameters)),
+    ("dependencies", Each(Always, effects::calculated_parameters)),
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),
     ("logs", Each(Always, logs::switches)),

@@ -50,6 +50,8 @@ variables! { for Cart;
     k = parameter(&FACTOR) in k;
     /// Damping
     d = parameter(&FACTOR) in d;
+    /// Natural angular frequency
+    omega = calculated_parameter(&FACTOR) by |cart| if mistake() == "stiff" { 1.0 } else { cart.k.sqrt() };
     /// Number of hits
     hits = output(&INTEGER).exact() in hits;
 }

@@ -49,6 +49,19 @@ const REMEDIES: [(&str, &str); 12] = [
     ),
 ];
 
+/// Rules whose findings are only notes, but usually mistakes of an author, and what to do.
+const HINTS: [(&str, &str); 3] = [
+    (
+        "start_values.no-effect",
+        "use it or remove it, unless it acts only with other inputs or later than in this check",
+    ),
+    ("dependencies.calculated-parameter", "calculate it from parameters in `update`, or make it a constant"),
+    (
+        "dynamics.counted-entry",
+        "`event` must check whether its condition holds, because importers may call it at any time",
+    ),
+];
+
 /// How a model ends the process, or never returns, which it must not do in any call sequence.
 const ENDS: [&str; 3] = [".crash", ".exit", ".hang"];
 
@@ -72,7 +85,9 @@ pub fn judge(options: &Options) -> Result<bool> {
         texts.for_each(|text| println!("error: {text}"));
         return Ok(false);
     }
-    for finding in others.iter().filter(|finding| finding.severity > Severity::Note) {
+    for finding in
+        others.iter().filter(|finding| finding.severity > Severity::Note || hint(finding).is_some())
+    {
         println!("warning: {}", text(finding));
     }
     for unchecked in report.unreached.iter().filter(|unchecked| !unchecked.allowed) {
@@ -104,7 +119,7 @@ fn is_random(finding: &Finding) -> bool {
 
 /// Returns whether a finding rejects the build.
 fn is_mistake(finding: &Finding) -> bool {
-    match remedy(finding) {
+    match remedy(finding).filter(|_| hint(finding).is_none()) {
         // Values that are not finite are only a note for FMUs of other tools.
         Some(_) => finding.severity == Severity::Violation || finding.name == "results.not-finite",
         None => ENDS.iter().any(|end| finding.name.ends_with(end)),
@@ -117,13 +132,18 @@ fn remedy(finding: &Finding) -> Option<(usize, &'static str)> {
     Some((rank, REMEDIES[rank].1))
 }
 
+/// Returns the hint for a finding that is only a note.
+fn hint(finding: &Finding) -> Option<&'static str> {
+    HINTS.iter().find(|(rule, _)| finding.name == *rule).map(|(_, hint)| *hint)
+}
+
 /// Returns the message for a finding.
 fn text(finding: &Finding) -> String {
-    let remedy = match remedy(finding) {
+    let remedy = match hint(finding).or_else(|| remedy(finding).map(|(_, remedy)| remedy)) {
         _ if finding.name.ends_with(".hang") => {
             "; if it is only slow, allow more with --time-limit SECONDS".to_owned()
         }
-        Some((_, remedy)) if !remedy.is_empty() => format!("; {remedy}"),
+        Some(remedy) if !remedy.is_empty() => format!("; {remedy}"),
         _ => String::new(),
     };
     format!("{}{remedy} ({}; cargo fmu check has the calls)", finding.observed, finding.name)
