@@ -561,8 +561,9 @@ fn is_up_to_date(path: &Path, content: &str) {
     assert!(found == content, "{}: {difference:?} (UPDATE_EXPECTED=1 writes it)", path.display());
 }
 
-/// Writes the code in the guide for authors into the package, stage by stage, and runs the guide's commands. Their output must be as in
-/// the guide, and the last stage must equal the model of `cargo fmu new --from tank`.
+/// Writes the code in the guide for authors into packages, stage by stage, and runs the guide's commands. Their output must be as in
+/// the guide. The stages with numbers are those of the tank, and the last one must equal the model of `cargo fmu new --from tank`. The other
+/// stages have the names of their packages.
 fn follow_the_guide(directory: &Directory, guide: &Path) {
     let page = fs::read_to_string(guide).unwrap().replace("\r\n", "\n");
     let all = blocks(&page);
@@ -577,6 +578,7 @@ fn follow_the_guide(directory: &Directory, guide: &Path) {
                     updated.replacen(&format!("```rust\n{content}```"), &format!("```rust\n{written}```"), 1);
             }
         }
+        let package = if stage.parse::<u32>().is_ok() { "tank" } else { stage };
         let Some(command) = content.lines().next().and_then(|line| line.strip_prefix("$ cargo fmu ")) else {
             continue;
         };
@@ -586,10 +588,10 @@ fn follow_the_guide(directory: &Directory, guide: &Path) {
             };
             let parts: Vec<_> = all.iter().filter(|(of, ..)| of == note).map(|(_, _, part)| *part).collect();
             if stage != "1" {
-                fs::write(directory.path(&format!("tank/{path}")), parts.join("\n")).unwrap();
+                fs::write(directory.path(&format!("{package}/{path}")), parts.join("\n")).unwrap();
             }
         }
-        let output = directory.prints("tank", &command.split(' ').collect::<Vec<_>>());
+        let output = directory.prints(package, &command.split(' ').collect::<Vec<_>>());
         // The sizes of the files and the guid differ between machines.
         let is_kept = |line: &&str| !line.contains(".fmu: ") && !line.starts_with("guid ");
         let output: String = output.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
@@ -614,6 +616,7 @@ fn follow_the_guide(directory: &Directory, guide: &Path) {
 fn the_guide_leads_to_a_checked_fmu() {
     let directory = Directory::new();
     directory.prints("", &["new", "tank"]);
+    directory.prints("", &["new", "regulator"]);
     follow_the_guide(&directory, &Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/author-guide.md"));
     let output = directory.run("tank", env!("CARGO"), &["test", "--quiet"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -7,6 +7,9 @@ def main() -> int:
     """Run `prw`. Returns the exit status, 130 also for an interrupt during the imports, which take most of the time of short
     commands."""
     try:
+        from prw import interrupts
+
+        interrupts.wait_for_imports()
         from prw.cli import main as run
 
         return run()
