@@ -37,26 +37,24 @@ pub(crate) struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Checks the FMU and prints its warnings. If it is the last one that has passed, only prints the warnings of that check again, because
-    /// the same calls have the same results.
+    /// Checks the FMU and returns the lines to print: its warnings. If it is the last one that has passed, they are the warnings of that
+    /// check, because the same calls have the same results.
     ///
     /// # Errors
     /// When the FMU has a mistake, or cannot be checked.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self) -> Result<String> {
         let key = self.key()?;
         let record = fs::read_to_string(self.record).unwrap_or_default();
         if let Some(warnings) = record.strip_prefix(&key) {
             let name = self.fmu.file_name().unwrap_or_default().display();
-            eprint!(
+            return Ok(format!(
                 "{name} has passed this check in an earlier build, so it is not checked again\n{warnings}"
-            );
-            return Ok(());
+            ));
         }
         let warnings = self.warnings()?;
-        eprint!("{warnings}");
         // Without the record, the next build checks the FMU again.
         let _ = fs::write(self.record, key + &warnings);
-        Ok(())
+        Ok(warnings)
     }
 
     /// Returns the line that identifies the FMU, the checker and the limit. An installation of another checker changes its size or time.

@@ -136,6 +136,7 @@ impl Builder {
             // Both versions have the same model, so one is checked: FMI 3.0, whose description states more dependencies. If there are
             // arrays, both are, because FMI 2.0 has their elements as variables.
             let unchecked = if model.table.arrays { 0 } else { descriptions.len() - 1 };
+            let mut printed: Vec<String> = Vec::new();
             for (fmi, description) in &descriptions[unchecked..] {
                 let parts = Parts {
                     fmi: *fmi,
@@ -149,7 +150,14 @@ impl Builder {
                 let fmu = directory.path().join(format!("{}.fmu", model.identifier()));
                 let Packed { guid, .. } = pack(&fmu, &parts)?;
                 let record = target.join(format!(".{}-fmi{}-checked", model.identifier(), *fmi as u32 + 2));
-                Check { checker, fmu: &fmu, guid: &guid, limit: time_limit, record: &record }.run()?;
+                let check = Check { checker, fmu: &fmu, guid: &guid, limit: time_limit, record: &record };
+                // Usually the warnings of both versions are the same.
+                for line in check.run()?.lines() {
+                    if !printed.iter().any(|before| before == line) {
+                        eprintln!("{line}");
+                        printed.push(line.to_owned());
+                    }
+                }
             }
         }
         if versions.contains(&Standard::Fmi2) {
