@@ -65,6 +65,9 @@ def step_ratio() -> str:
 NUMBERS: list[tuple[str, str, Callable[[], object]]] = [
     ("README.md", "| **Exact** | within {} of the exact solution", tolerance),
     ("README.md", "takes 1/{} of the time that it takes with FMPy", lambda: round(FMPY["testbed"])),
+    ("docs/README.md", "| {} times as long as a loop in C", lambda: RATIOS["runs"]["testbed"][0]),
+    ("docs/README.md", "| {} times as long as fmu_run", lambda: round(FMPY["testbed"])),
+    ("docs/README.md", "| {} runs per second |", lambda: f"{RATIOS['loops']['fmu_run, 1 thread'][0]:,.0f}"),
     ("README.md", "{} other tools have run it", lambda: len(tools_that_ran())),
     ("README.md", "{} of them do so in `make test`", tools_in_make_test),
     ("crates/fmu-check/README.md", "In each of the {} Reference FMUs", reference_fmus),
