@@ -35,7 +35,8 @@ struct Rule {
     /// Topic, a dot, and the name within the topic.
     name: &'static str,
     requirement: &'static str,
-    /// Sentence of the standard with its section, if the page has one.
+    /// Sentence of the standard that states the requirement, with its section. `None` if RULES.md quotes none, because the requirement
+    /// follows from several sentences, or is not in the standard.
     quotation: Option<&'static str>,
     /// For FMI 2.0 and FMI 3.0, the severity and the section, such as `note, 2.1.5`, or `note, not in the standard`.
     judgements: [&'static str; 2],

@@ -65,8 +65,9 @@ pub fn evidence(finding: &Finding, run: &Run, until: Instant) -> Evidence {
     Evidence::Same(expected, pairs)
 }
 
-/// Returns the pairs of calls whose values only have to differ, because the criterion is fulfilled if they are equal, and violated if either
-/// has any other value. They are not compared with the values of this run, because they may be different in every run.
+/// Returns the pairs of calls for which it suffices that their values differ: if both had the same value, there would be no finding, and with
+/// any other value there would still be one. A replay does not compare them with the values of this run, because uninitialized memory, for
+/// example, has other values in each run.
 fn unequal(criterion: &SharedCriterion, run: &Run, expected: &[Expected]) -> Vec<[u32; 2]> {
     let compared: Vec<&Outcome> = expected
         .iter()

@@ -1,4 +1,5 @@
-//! A model with Reals in every kind of field, a state whose start value is calculated, and `step_fast`.
+//! A model that stores Reals wherever a model may store them, because the fast paths access plain fields by their offsets, and must leave all
+//! others to the general path. It also has a state whose start value is calculated, and `step_fast`.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
