@@ -28,25 +28,17 @@ pub fn find_library(directory: &Path, standard: Standard, identifier: &str) -> R
     let name = format!("{identifier}{DLL_SUFFIX}");
     let directories = directories(standard);
     let binaries = directory.join("binaries");
-    if let Some(found) =
-        directories.iter().map(|directory| binaries.join(directory).join(&name)).find(|path| path.is_file())
-    {
-        return Ok(found);
-    }
-    // The name of a directory may also contain the ABI, such as x86_64-linux-gnu (section 2.5.1.4.1 of FMI 3.0).
-    let with_abi =
-        |name: &String| standard == Standard::Fmi3 && name.starts_with(&format!("{}-", directories[0]));
     let mut others: Vec<_> = std::fs::read_dir(&binaries)
         .into_iter()
         .flatten()
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .collect();
     others.sort();
-    if let Some(found) = others
-        .iter()
-        .filter(|name| with_abi(name))
-        .map(|other| binaries.join(other).join(&name))
-        .find(|path| path.is_file())
+    // The name of a directory may also contain the ABI, such as x86_64-linux-gnu (section 2.5.1.4.1 of FMI 3.0).
+    let with_abi = format!("{}-", directories[0]);
+    let has_abi = |other: &&String| standard == Standard::Fmi3 && other.starts_with(&with_abi);
+    let candidates = directories.iter().chain(others.iter().filter(has_abi));
+    if let Some(found) = candidates.map(|other| binaries.join(other).join(&name)).find(|path| path.is_file())
     {
         return Ok(found);
     }
