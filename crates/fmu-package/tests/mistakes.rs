@@ -4,8 +4,9 @@
 //! although each mistake is packed in an FMU of its own.
 #![cfg(target_os = "linux")]
 
+use fmu_test_kit::c_programs::library;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
@@ -49,16 +50,6 @@ fn build(directory: &Path, model: &str, mistake: &str, fmi: &str) -> (bool, Stri
     command.arg(format!("{}={}", platform(fmi), library(model).display())).current_dir(directory);
     let output = command.output().unwrap();
     (output.status.success(), String::from_utf8(output.stderr).unwrap())
-}
-
-/// Compiles a model, if cargo has not compiled it with this test.
-fn library(model: &str) -> PathBuf {
-    let directory = Path::new(env!("CARGO_BIN_EXE_cargo-fmu")).parent().unwrap();
-    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--quiet", "--locked", "--manifest-path", manifest, "--example", model]);
-    assert!(cargo.arg("--target-dir").arg(directory.parent().unwrap()).status().unwrap().success());
-    directory.join(format!("examples/lib{model}.so"))
 }
 
 fn platform(fmi: &str) -> &'static str {
