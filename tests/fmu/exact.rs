@@ -74,6 +74,19 @@ pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     jacobian
 }
 
+/// Returns the exponential of a matrix: the series of a fraction of it, squared repeatedly.
+fn exponential(matrix: SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
+    let largest = matrix.iter().fold(1.0, |largest: f64, x| largest.max(x.abs()));
+    let halvings = largest.log2().ceil() as i32 + 4;
+    let part = matrix * 0.5_f64.powi(halvings);
+    let (mut sum, mut term) = (SMatrix::identity(), SMatrix::identity());
+    for k in 1..16 {
+        term = term * part / f64::from(k);
+        sum += term;
+    }
+    (0..halvings).fold(sum, |power, _| power * power)
+}
+
 /// Returns the state and the motor angles after time h, while the motors turn at constant rates.
 pub fn advanced(
     p: &Parameters,
@@ -88,7 +101,7 @@ pub fn advanced(
     generator.fixed_view_mut::<6, 4>(0, 6).copy_from(&system.B);
     (generator[(6, 8)], generator[(7, 9)]) = (1.0, 1.0);
     let start = SMatrix::<f64, 10, 1>::from_iterator(x.into_iter().chain(theta).chain(rates));
-    let end = (generator * h).exp() * start;
+    let end = exponential(generator * h) * start;
     (std::array::from_fn(|i| end[i]), [end[6], end[7]])
 }
 
