@@ -1,7 +1,8 @@
 /* Loads FMUs, uses instances of all of them in both FMI versions, frees the instances in varying order, and unloads:
    reload ROUNDS LIBRARY...
-   Prints the resident memory in KiB after a tenth of the rounds and at the end. */
+   Prints the allocated bytes and the resident memory in KiB after a tenth of the rounds and at the end. */
 #include "fmu.h"
+#include <malloc.h>
 #include <unistd.h>
 
 enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, VARIABLES = 16, GUID_LENGTH = 64 };
@@ -101,26 +102,28 @@ static void free_all(struct fmu *fmu, int first) {
     fmu->fmi3FreeInstance(NULL);
 }
 
-static long resident(void) {
+static void print_memory(void) {
+    struct mallinfo2 heap = mallinfo2();
     long size = 0, pages = 0;
     FILE *file = fopen("/proc/self/statm", "r");
     CHECK(file && fscanf(file, "%ld %ld", &size, &pages) == 2);
     fclose(file);
-    return pages * (sysconf(_SC_PAGESIZE) / 1024);
+    printf("%zu %ld\n", heap.uordblks + heap.hblkhd, pages * (sysconf(_SC_PAGESIZE) / 1024));
 }
 
 int main(int argc, char **argv) {
     int libraries = argc - 2, rounds = argc > 2 ? atoi(argv[1]) : 0, round, i;
     struct fmu fmus[LIBRARIES];
     CHECK(libraries > 0 && libraries <= LIBRARIES && rounds > 0);
+    setvbuf(stdout, NULL, _IONBF, 0); /* a buffer would count as a leak */
     for (round = 0; round < rounds; ++round) {
         for (i = 0; i < libraries; ++i) fmus[i] = open_fmu(argv[2 + (i + round) % libraries]);
         for (i = 0; i < libraries; ++i) use(&fmus[i]);
         for (i = 0; i < libraries; ++i) free_all(&fmus[(i + round) % libraries], round % INSTANCES);
         for (i = 0; i < libraries; ++i) CHECK(dlclose(fmus[i].library) == 0);
         for (i = 0; i < libraries; ++i) CHECK(!dlopen(argv[2 + i], RTLD_NOW | RTLD_NOLOAD));
-        if (round == rounds / 10) printf("%ld\n", resident());
+        if (round == rounds / 10) print_memory();
     }
-    printf("%ld\n", resident());
+    print_memory();
     return 0;
 }
