@@ -72,7 +72,6 @@ fn accepts(model: &str, difference: &str, fmi: &str) {
 fn fields_that_saved_states_lack_are_found() {
     accepts("memory", "", "2");
     accepts("memory", "", "3");
-    accepts("memory", "random", "2");
     for field in ["last", "sum", "shown"] {
         rejects("memory", field, "2", &["y was ", "after `memory in` of variables!", "states."]);
     }
@@ -96,7 +95,8 @@ fn an_fmu_is_checked_once() {
 
 #[test]
 fn states_follow_their_derivatives() {
-    for difference in ["", "at rest", "stiff", "friction", "jumps"] {
+    // The other tests build the differences "", "stiff" and "jumps".
+    for difference in ["at rest", "friction"] {
         accepts("cart", difference, "3");
     }
     for (mistake, text) in [
@@ -161,15 +161,16 @@ fn probable_mistakes_are_warnings() {
 
 #[test]
 fn derivatives_equal_differences_of_the_values() {
+    // The check reads the derivatives of each FMI version with the same code, so each mistake is in one of them.
     for fmi in ["2", "3"] {
         accepts("square", "", fmi);
-        for (mistake, text) in [
-            ("partial", "y with respect to u is "),
-            ("no number", "y with respect to u: "),
-            ("initial_partial", "y in Initialization Mode with respect to u is "),
-        ] {
-            rejects("square", mistake, fmi, &[text, "the functions of `Partials`"]);
-        }
+    }
+    for (mistake, fmi, text) in [
+        ("partial", "2", "y with respect to u is "),
+        ("no number", "3", "y with respect to u: "),
+        ("initial_partial", "3", "y in Initialization Mode with respect to u is "),
+    ] {
+        rejects("square", mistake, fmi, &[text, "the functions of `Partials`"]);
     }
     // Time is not a variable of the model, so only FMI 3.0 has derivatives with respect to it.
     rejects("square", "partial_by_time", "3", &["y with respect to time is ", "the functions of `Partials`"]);
