@@ -7,10 +7,12 @@ import re
 import sys
 
 import monte_carlo
+import pytest
 import rig
 from built import ROOT
 
 
+@pytest.mark.long
 def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(monte_carlo, "FAULTS", {"gain": ("gain of tau1, % too much", (10.0,))})
     monkeypatch.setattr(monte_carlo, "commit", lambda: "0123abc")
@@ -32,6 +34,7 @@ def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys
     assert (tmp_path / "again.svg").read_bytes() == figure.read_bytes()
 
 
+@pytest.mark.long
 def test_rigs_with_what_reality_adds(fmu, tmp_path, monkeypatch):
     chosen = ("friction", "crosstalk", "jitter", "wrapped")
     monkeypatch.setattr(monte_carlo, "REAL", {name: monte_carlo.REAL[name] for name in ("nothing", *chosen)})

@@ -25,6 +25,7 @@ def tools(*arguments):
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
+@pytest.mark.long
 def test_it_writes_figures_and_tables_and_prints_results(closed_loop, tmp_path):
     run = tools("--fmus", str(FMUS), "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr

@@ -182,6 +182,7 @@ def test_shapers_leave_no_vibration_of_the_nominal_wrist(learned: Any) -> None:
     assert left[1] > 2 and left[2] < 0.05 and left[3] < 0.05
 
 
+@pytest.mark.long
 def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> None:
     figure, left = learned.main(count=512, rounds=40, fresh=100)
     assert {name: len(values) for name, values in left.items()} == dict.fromkeys(left, 100)
@@ -189,6 +190,7 @@ def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> Non
     assert len(figure.axes) == 2
 
 
+@pytest.mark.long
 def test_a_little_learning_beats_every_lqr() -> None:
     limits = importlib.import_module("learned_limits")
     figure, away = limits.main(count=512, rounds=24, fresh=200)

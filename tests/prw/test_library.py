@@ -306,9 +306,9 @@ def blocks(page: str) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
 def test_the_programs_in_the_readmes(
-    page: str, testbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    page: str, fmu: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The programs run unchanged in the repository root, and print what the page shows after them."""
+    """The programs run unchanged in the repository root, and print what the page shows after them. They name the FMU for FMI 2.0."""
     found = blocks(page)
     monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}
@@ -322,7 +322,7 @@ def test_the_programs_in_the_readmes(
     assert compared == (2 if page == "README.md" else 1) and names["found"].fits
     if page == "README.md":
         assert names["run"].parameters["k1"] == pytest.approx(1.8 * 180 / np.pi) and names["model"].A.shape == (6, 6)
-        assert names["table"].num_rows == 100 and prw.simulate(fmu=testbed).parameters["k1"] == pytest.approx(
+        assert names["table"].num_rows == 100 and prw.simulate(fmu=fmu).parameters["k1"] == pytest.approx(
             120.9, abs=0.05
         )
 
