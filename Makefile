@@ -143,6 +143,7 @@ test: need-rust need-python
 # What takes too long for make test: each template of cargo fmu to its checked FMU, and the tools that maintain this repository.
 test-long: need-rust headers importer-fmus source-fmu $(VENV)/examples.stamp
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu -- --ignored
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-check --test mutants -- --ignored
 	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop tests/examples
 
 # C programs are compiled with the headers of the standard, which FMPy contains.
