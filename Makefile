@@ -142,6 +142,7 @@ test: need-rust need-python
 
 # What takes too long for make test: each template of cargo fmu to its checked FMU, and the tools that maintain this repository.
 test-long: need-rust headers importer-fmus source-fmu $(VENV)/examples.stamp
+	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu -- --ignored
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-check --test mutants -- --ignored
 	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop tests/examples
@@ -168,8 +169,8 @@ test-crates: compile-tests headers
 	  set -x; $(NO_JOBS) $(CARGO) test $(LOCKED) $(LINTED) --workspace --lib --bins --tests; \
 	fi
 
+# rustdoc needs every dependency compiled once more, so make test-long looks for links that lead nowhere.
 test-docs: compile-tests
-	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
 	$(NO_JOBS) $(CARGO) test $(LOCKED) $(LINTED) --workspace --doc --quiet
 
 check-windows: compile-tests
