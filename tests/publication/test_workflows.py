@@ -41,6 +41,26 @@ def test_an_action_has_one_version() -> None:
     assert used and len(used) == len({name for name, _ in used})
 
 
+def test_every_target_of_the_makefile_runs_in_a_workflow() -> None:
+    """A workflow names the target, as a command or as a part of `make check-release`, or a target that it names needs it."""
+    database = subprocess.run(["make", "-npq"], cwd=ROOT, capture_output=True, text=True).stdout.replace("\\\n", "")
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", database, re.M)
+    targets = set(phony.split())
+    # The prerequisites, and the targets that a recipe passes to another make.
+    needs = {
+        name: {word for word in re.sub(r"^(\t(?!.*\$\(MAKE\))|#).*\n", "", rule, flags=re.M).split() if word in targets}
+        for name, rule in re.findall(r"^([\w-]+):(.*\n(?:\t.*\n|#.*\n)*)", database, re.M)
+    }
+    named = re.sub(r"^ *#.*", "", "\n".join([*map(text, WORKFLOWS), text(".ci/run")]), flags=re.M)
+    reached: set[str] = set()
+    waiting = {word for line in re.findall(r"\bmake ([\w =-]+)", named) for word in re.split("[ =]", line)} & targets
+    waiting |= {name for name in re.findall(r"^ +- ([\w-]+)$", named, re.M) if name in targets}
+    while waiting:
+        reached |= waiting
+        waiting = {need for name in waiting for need in needs[name]} - reached
+    assert targets - reached == set()
+
+
 @pytest.mark.parametrize(("python", "platform"), [("3.11", "linux"), ("3.14", "macos"), ("3.14", "windows")])
 def test_the_lock_has_the_hash_of_every_package(python: str, platform: str, tmp_path: Path) -> None:
     """A release is built on Linux and macOS only. The directory is empty, so no installed package hides that the lock lacks it."""
