@@ -140,10 +140,12 @@ test: need-rust need-python
 	PROGRAMS=target/debug $(PYTEST) -m 'not long' $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 	$(PYTEST) -m small tests/source_fmu
 
-# What takes too long for make test: each template of cargo fmu to its checked FMU, and the tools that maintain this repository.
+# What takes too long for make test, which has a quick test of each kind: links in the documentation of the crates; each template of
+# cargo fmu to its checked FMU, the guide for authors, further mistakes in models; each planted fault alone; campaigns of simulated rigs,
+# learning, and the tools that maintain this repository.
 test-long: need-rust headers importer-fmus source-fmu $(VENV)/examples.stamp
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
-	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu -- --ignored
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu --test mistakes -- --ignored
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-check --test mutants -- --ignored
 	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop tests/examples
 

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -139,8 +140,7 @@ def test_a_change_is_checked_where_it_is() -> None:
     def lines(*names: str) -> str:
         return "\n".join(" ".join(command) for command in changed.commands(list(names)))
 
-    assert lines("README.md") == ""
-    assert "tests/publication" in lines("docs/checking.md")
+    assert "tests/prw/test_library.py" in lines("README.md") and "tests/publication" in lines("docs/checking.md")
     assert "ruff check dev/tools/changed.py" in lines("dev/tools/changed.py")
     assert "tests/prw" in lines("python/prw/src/prw/cli.py") and "tests/prw/test_readers.py" in lines(
         "tests/prw/test_readers.py"
@@ -150,3 +150,13 @@ def test_a_change_is_checked_where_it_is() -> None:
     assert "rdeps(=prw_testbed)" in lines("modelDescription/parameters.json")
     assert "rdeps(=fmu-check)" in lines("crates/fmu-check/src/a_deleted_file.rs")
     assert "build_fmu" not in lines("crates/fmu-run/src/fmu.rs")
+    page = lines("docs/fmu-page/wrist/steps.js")
+    assert "build_fmu" in page and "--no-page" not in page and "tests/fmpy/test_page.py" in page
+
+
+def test_the_table_of_tests_names_what_exists() -> None:
+    files = changed.git("ls-files")
+    for pattern in (*changed.TESTS, *changed.PAGE):
+        assert changed.matches(files, pattern), pattern
+    for name in (*chain(*changed.TESTS.values()), *changed.CORE):
+        assert (ROOT / name).exists(), name

@@ -109,6 +109,32 @@ mod linux {
         unsafe { libc::poll(&raw mut poll, 1, 0) > 0 && poll.revents & libc::POLLHUP != 0 }
     }
 
+    /// Waits until a child ends, at most for `limit`. The child may then still have to be reaped.
+    pub fn wait_for_end(child: libc::pid_t, limit: Duration) {
+        // SAFETY: returns a descriptor of the child, which has not been reaped, or -1.
+        let file = unsafe { libc::syscall(libc::SYS_pidfd_open, child, 0) } as libc::c_int;
+        if file < 0 {
+            // The kernel is older than Linux 5.3.
+            return std::thread::sleep(Duration::from_micros(200));
+        }
+        let mut poll = libc::pollfd { fd: file, events: libc::POLLIN, revents: 0 };
+        // SAFETY: one descriptor, which is open and then closed.
+        unsafe {
+            libc::poll(&raw mut poll, 1, limit.as_millis() as libc::c_int);
+            libc::close(file);
+        }
+    }
+
+    /// Returns the number of processes and threads of the machine, modulo 65,536.
+    pub fn all_processes() -> u16 {
+        // SAFETY: fills the structure, for which zeros are valid.
+        unsafe {
+            let mut info: libc::sysinfo = std::mem::zeroed();
+            libc::sysinfo(&raw mut info);
+            info.procs
+        }
+    }
+
     /// Returns the descendants that are alive, with their names.
     pub fn descendants() -> Vec<(libc::pid_t, String)> {
         let mut children: HashMap<libc::pid_t, Vec<(libc::pid_t, String)>> = HashMap::new();

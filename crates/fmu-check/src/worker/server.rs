@@ -1,7 +1,10 @@
 //! Server process that forks a child process for every call sequence, because starting a program takes several times as long as a
 //! fork. The server adopts and ends the orphaned processes of a call sequence.
 
-use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
+use super::contain::{
+    MOST_PROCESSES, abandoned, adopt_descendants, all_processes, descendants, end_descendants, isolate,
+    wait_for_end,
+};
 use super::job::{Ended, SCRATCH};
 use super::memory::calls_in_progress;
 use super::use_for_temporary_files;
@@ -16,6 +19,9 @@ use std::time::{Duration, Instant};
 
 /// Maximum number of bytes of the standard output and standard error of a process that are recorded.
 const MOST_OUTPUT: u64 = 1 << 20;
+
+/// How often the number of processes is compared with the limit, and the checker is looked for.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Executes jobs until the standard input ends. Each line of the input has the limit in seconds and a job.
 pub fn serve() -> Result<(), String> {
@@ -85,7 +91,7 @@ fn execute(job: &str, [output, outcomes]: [File; 2]) -> ! {
 /// Waits for a process for at most `limit` seconds. Returns its wait status if it ended, the number of processes if there were
 /// too many, and neither if the limit was reached or the checker has ended.
 fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
-    let (begin, mut status, mut looked) = (Instant::now(), 0, Instant::now());
+    let (begin, before, mut status, mut looked) = (Instant::now(), all_processes(), 0, Instant::now());
     loop {
         // SAFETY: no other code waits for children of this process.
         match unsafe { libc::waitpid(-1, &raw mut status, libc::WNOHANG) } {
@@ -95,11 +101,15 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
             // The process that ended is an adopted orphan.
             _ => continue,
         }
-        if looked.elapsed() > Duration::from_millis(20) {
+        if looked.elapsed() >= LOOK {
             looked = Instant::now();
-            let count = descendants().len();
-            if count > MOST_PROCESSES {
-                return (None, Some(count));
+            // Only the descendants count, but finding them means reading a file of each process of the machine.
+            let more = all_processes().wrapping_sub(before) as i16;
+            if usize::try_from(more).is_ok_and(|more| more > MOST_PROCESSES) {
+                let count = descendants().len();
+                if count > MOST_PROCESSES {
+                    return (None, Some(count));
+                }
             }
             if abandoned() {
                 return (None, None);
@@ -108,7 +118,7 @@ fn wait(child: libc::pid_t, limit: f64) -> (Option<ExitStatus>, Option<usize>) {
         if begin.elapsed().as_secs_f64() > limit {
             return (None, None);
         }
-        std::thread::sleep(Duration::from_micros(200));
+        wait_for_end(child, LOOK);
     }
 }
 
