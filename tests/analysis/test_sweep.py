@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import math
+import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy.stats import norm, qmc
@@ -164,6 +171,139 @@ def test_a_killed_sweep_continues(tmp_path, fmu):
     assert files(tmp_path / "killed") == files(tmp_path / "whole")
 
 
+FEW = {"grid": {"k1": list(np.linspace(100, 140, 40))}, "outputs": "roll", "statistics": "end", "motion": fig4(0.05)}
+#: Runs in a part, and the number of parts.
+PART, PARTS = 16, 3
+
+
+@pytest.fixture(scope="module")
+def interrupted(fmu, tmp_path_factory):
+    """A sweep with trajectories whose table is not yet written, and the table."""
+    directory, replace = tmp_path_factory.mktemp("interrupted"), os.replace
+
+    def stop(source, target):
+        if Path(target).name == "runs.parquet":
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    os.replace = stop
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            prw.sweep(**FEW, trajectories=1, fmu=fmu, out=directory)
+    finally:
+        os.replace = replace
+    return directory, prw.sweep(**FEW, fmu=fmu)
+
+
+def rewritten(change):
+    """A damage that changes the rows or columns of a table but keeps its record and its checksum."""
+
+    def damage(path):
+        table = pq.read_table(path, partitioning=None)
+        pq.write_table(change(table).replace_schema_metadata(table.schema.metadata), path)
+
+    return damage
+
+
+def as_fifo(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def changed_value(table):
+    return table.set_column(table.column_names.index("roll_end"), "roll_end", pa.array(np.zeros(len(table))))
+
+
+DAMAGES = {
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:-100]),
+    "empty": lambda path: path.write_bytes(b""),
+    "a pipe": as_fifo,
+    "another part": lambda path: shutil.copy(path.with_name("part-00002.parquet"), path),
+    "missing rows": rewritten(lambda table: table.slice(1)),
+    "doubled rows": rewritten(lambda table: pa.concat_tables([table, table])),
+    "other columns": rewritten(lambda table: table.drop_columns("run")),
+    "a new column": rewritten(lambda table: table.append_column("old", pa.array([[1]] * len(table)))),
+    "a changed value": rewritten(changed_value),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_part_is_repeated(interrupted, fmu, tmp_path, damage):
+    """Only the runs of the damaged part are repeated, with a warning, and the result is as if nothing had happened."""
+    directory, whole = interrupted
+    kinds = ["parts"] if "value" in damage else ["parts", "trajectories"]
+    for kind in kinds:
+        out, finished = tmp_path / kind, []
+        shutil.copytree(directory, out)
+        DAMAGES[damage](out / kind / "part-00001.parquet")
+        with pytest.warns(UserWarning, match=rf"{kind}.part-00001.parquet.* runs 16 to 31 are repeated") as warned:
+            table = prw.sweep(**FEW, trajectories=1, fmu=fmu, out=out, progress=lambda *done: finished.append(done))  # noqa: B023
+        assert len(warned) == 1 and table.equals(whole) and finished[0] == (40 - PART, 40)
+        assert pq.read_table(out / "trajectories")["run"].to_pylist() == list(np.repeat(np.arange(40), 41))
+        assert not (out / "parts").exists()
+
+
+def test_a_damaged_table_is_made_again(prw, tmp_path):
+    (tmp_path / "in.csv").write_text("time,theta1,theta2\n0,0,0\n0.05,0.01,0\n0.1,0.03,0\n")
+    line = ["sweep", "--grid", "k1=100:140:40", "--outputs", "roll", "--statistics", "end", "--input", "in.csv"]
+    line += ["--out", "out"]
+    assert "ran         40 runs" in prw(*line).stdout
+    path = tmp_path / "out" / "runs.parquet"
+    sound = path.read_bytes()
+    rewritten(lambda table: pa.concat_tables([table] * 100))(path)
+    result = prw(*line)
+    assert result.returncode == 0 and "ran         40 runs" in result.stdout
+    assert (
+        "note        out/runs.parquet: was changed after it was written, so runs 0 to 39 are repeated" in result.stdout
+    )
+    assert path.read_bytes() == sound
+    result = prw(*line)
+    assert "kept        40 finished runs in out" in result.stdout and "ran         0 runs" in result.stdout
+
+
+def test_foreign_files_in_the_directory_of_a_sweep(interrupted, fmu, tmp_path):
+    """A file that this sweep has not written is never overwritten or counted."""
+
+    def with_record(change):
+        def write(path):
+            table = pq.read_table(path, partitioning=None)
+            metadata = table.schema.metadata
+            pq.write_table(
+                table.replace_schema_metadata({**metadata, b"prw.sweep": change(metadata[b"prw.sweep"])}), path
+            )
+
+        return write
+
+    def other_seed(record):
+        return json.dumps({**json.loads(record), "outputs": ["pitch"]}).encode()
+
+    first, again = "parts/part-00000.parquet", "parts/part-00000 (1).parquet"
+    for number, (name, write, message) in enumerate(
+        [
+            (
+                again,
+                lambda path: shutil.copy(path.with_name("part-00000.parquet"), path),
+                "is not a part of this sweep",
+            ),
+            ("parts/part-00003.parquet", lambda path: path.write_bytes(b""), "is not a part of this sweep"),
+            ("trajectories/notes.txt", lambda path: path.write_text("mine"), "is not a part of this sweep"),
+            (first, with_record(other_seed), r'other arguments \(outputs was \["pitch"\] and is \["roll"\]\)'),
+            (first, with_record(lambda record: record[:-5]), "has no record of its sweep"),
+            (first, with_record(lambda record: b"[]"), "has no record of its sweep"),
+            (first, with_record(lambda record: b'{"varied": 1}'), "has no record of its sweep"),
+            (first, lambda path: pq.write_table(pa.table({"run": [1]}), path), "has no record of its sweep"),
+            ("runs.parquet", lambda path: path.write_text("mine"), "cannot be read"),
+            ("runs.parquet", os.mkfifo, "it is not a regular file"),
+        ]
+    ):
+        out = tmp_path / str(number)
+        shutil.copytree(interrupted[0], out)
+        write(out / name)
+        with pytest.raises(prw.UserError, match=rf"{re.escape(name)}.*{message}.*; write into another directory"):
+            prw.sweep(**FEW, trajectories=1, fmu=fmu, out=out)
+        assert (out / name).exists() and len(list(out.glob("parts/part-0000?.parquet"))) >= PARTS
+
+
 def test_an_interrupted_sweep_keeps_the_finished_runs(tmp_path, fmu, monkeypatch):
     from prw import sweeps
 
@@ -194,6 +334,20 @@ def test_a_sweep_is_repeated_from_its_file(prw, tmp_path, fmu):
     (tmp_path / "still.csv").write_text("time,theta1,theta2\n0,0,0\n1,0,0\n")
     result = prw("sweep", "--again", "first/runs.parquet", "--input", "still.csv", "--out", "other")
     assert "--input: the sweep had another motion, fig4; give that motion, not still" in result.stderr
+    path = tmp_path / "first" / "runs.parquet"
+    sound = path.read_bytes()
+    for change, message in [
+        (lambda table: table.slice(1), "its parameters were changed after the sweep"),
+        (lambda table: table.drop_columns("k1"), "its parameters were changed after the sweep"),
+        (lambda table: table.set_column(3, "k1", pa.array(["x"] * 20)), "first/runs.parquet: k1: does not consist of"),
+    ]:
+        rewritten(change)(path)
+        result = prw("sweep", "--again", "first/runs.parquet", "--out", "other")
+        assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
+        path.write_bytes(sound)
+    rewritten(lambda table: table.drop_columns("roll_max"))(path)
+    result = prw("sweep", "--again", "first/runs.parquet", "--out", "other")
+    assert "other values in roll_max" in result.stdout
 
 
 @pytest.mark.parametrize("sampling", ["latin", "sobol"])
@@ -231,6 +385,43 @@ def test_parameters_of_an_identification_and_from_a_table(fmu, tmp_path):
     table = {name: found[name].to_numpy()[:5] for name in ("k1", "c1")}
     again = prw.sweep(table=table, parameters={"c2": 0.3}, **few)
     assert again["roll_end"].to_pylist() == found["roll_end"].to_pylist()[:5]
+    for place, value, message in [
+        (
+            ("correlation", "matrix", 0, 1),
+            2,
+            r"correlation.matrix\[0\]\[1\], of k1 with c1, is 2; it must be between -1 and 1",
+        ),
+        (("correlation", "matrix", 0, 1), 0.5, r"matrix\[0\]\[1\], of k1 with c1, is 0.5, but 0.68 in the other order"),
+        (
+            ("correlation", "matrix", 2, 2),
+            0,
+            r"matrix\[2\]\[2\], of gain of tau1 with gain of tau1, is 0; it must be 1",
+        ),
+        (("correlation", "matrix", 1, 2), math.nan, r"matrix\[1\]\[2\], of c1 with gain of tau1, is nan, not a finite"),
+        (("correlation", "matrix", 1), [1], "correlation.matrix needs 3 rows and columns"),
+        (("correlation", "matrix"), [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]], "has the eigenvalue -0.8"),
+        (("correlation", "names", 1), "k1", "correlation.names has k1 twice"),
+        (("correlation", "names", 1), ["k1"], "is neither a dict of distributions"),
+        (("parameters", "k1", "relative_standard_error"), math.nan, "parameters.k1.relative_standard_error is nan"),
+        (
+            ("parameters", "k1", "relative_standard_error"),
+            -0.1,
+            "relative_standard_error is -0.1; it must be at least 0",
+        ),
+        (("parameters", "k1", "value"), 0, "parameters.k1.value is 0; it must be above 0"),
+        (("parameters", "c2", "value"), "0.3", "parameters.c2.value is '0.3', not a finite number"),
+        (("parameters", "c2", "value"), 10**400, "parameters.c2.value is 1000"),
+        (("parameters", "c2"), 0.3, "parameters.c2.value is None"),
+        (("identified",), "no", "the data did not determine"),
+    ]:
+        damaged = copy.deepcopy(report)
+        inside = damaged
+        for key in place[:-1]:
+            inside = inside[key]
+        inside[place[-1]] = value
+        path.write_text(json.dumps(damaged))
+        with pytest.raises(prw.UserError, match=message):
+            prw.sweep(random=path, runs=2, **few)
     path.write_text(json.dumps({**report, "identified": False}))
     for arguments, message in [
         ({"random": path}, "random: the data did not determine the parameters"),

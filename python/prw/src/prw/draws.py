@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import os
+import sys
 from collections.abc import Mapping
 from numbers import Real
 from pathlib import Path
@@ -26,7 +27,7 @@ from prw.arguments import (
     spread_of,
 )
 from prw.errors import UserError
-from prw.files import read_text
+from prw.files import check_regular, read_text
 from prw.motion import Array
 from prw.testbed import Testbed
 
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from prw.identification.results import Identification
 
 MAX_RUNS = 10_000_000
+#: Tolerance of the entries of a correlation matrix, which may be rounded.
+EXACT = 1e-3
 #: How points are drawn: independently, or more evenly by `scipy.stats.qmc`.
 SAMPLINGS = ("random", "latin", "sobol")
 #: The distribution of a parameter, see `prw.sweep`.
@@ -66,29 +69,76 @@ class Joint(NamedTuple):
 def joint_of(random: Identification | str | os.PathLike[str]) -> Joint:
     """The distribution of the estimates of an identification, or of its file report.json. Raises UserError if it cannot be read,
     or if the parameters were not identified."""
+    where = str(random) if is_path(random) else "the identification"
     try:
         content = json.loads(read_text(Path(random)) if is_path(random) else random.to_json())  # type: ignore[arg-type, union-attr]
-        names, correlation = content["correlation"]["names"], np.array(content["correlation"]["matrix"])
-        entries, identified = content["parameters"], content["identified"]
-        estimated = [name for name in names if name in entries]  # Distortions are not parameters of the FMU.
-        relative = np.array([entries[name]["relative_standard_error"] for name in estimated])
-        values = {name: float(entry["value"]) for name, entry in entries.items()}
+        names, matrix = list(content["correlation"]["names"]), content["correlation"]["matrix"]
+        entries, identified = dict(content["parameters"]), content["identified"]
+        if not all(isinstance(name, str) for name in names):
+            raise TypeError
     except OSError as error:
         raise UserError(f"{random} cannot be read ({error.strerror or error})", argument="random") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise UserError(
             f"{random!r} is neither a dict of distributions, nor an identification or its report.json",
             argument="random",
         ) from None
-    if not identified:
+    if identified is not True:
         raise UserError(
             "the data did not determine the parameters, or the FMU does not explain the data; give the distributions yourself, as in "
             '{"k1": 0.1}',
             argument="random",
         )
-    chosen = [names.index(name) for name in estimated]
-    others = {name: value for name, value in values.items() if name not in estimated}
-    return Joint({name: values[name] for name in estimated}, relative, correlation[np.ix_(chosen, chosen)], others)
+    values = {name: _entry(where, f"parameters.{name}.value", entry, "value") for name, entry in entries.items()}
+    correlation = _correlation(where, names, matrix)
+    chosen = [k for k, name in enumerate(names) if name in entries]  # Distortions are not parameters of the FMU.
+    medians = {names[k]: values[names[k]] for k in chosen}
+    for name, value in medians.items():
+        if value <= 0:
+            raise UserError(f"{where}: parameters.{name}.value is {value:g}; it must be above 0", argument="random")
+    key = "relative_standard_error"
+    relative = np.array([_entry(where, f"parameters.{name}.{key}", entries[name], key) for name in medians])
+    for name, deviation in zip(medians, relative):
+        if deviation < 0:
+            raise UserError(
+                f"{where}: parameters.{name}.{key} is {deviation:g}; it must be at least 0", argument="random"
+            )
+    others = {name: value for name, value in values.items() if name not in medians}
+    return Joint(medians, relative, correlation[np.ix_(chosen, chosen)], others)
+
+
+def _entry(where: str, name: str, entry: Any, key: str) -> float:
+    """The finite number `entry[key]` of a report. Raises UserError, which calls it `name`."""
+    value = entry.get(key) if isinstance(entry, dict) else None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= sys.float_info.max:
+        raise UserError(f"{where}: {name} is {value!r}, not a finite number", argument="random")
+    return float(value)
+
+
+def _correlation(where: str, names: list[str], matrix: Any) -> Array:
+    """The correlation matrix (p, p) of a report. Raises UserError that names the first entry that cannot be right."""
+    p = len(names)
+    if not isinstance(matrix, list) or [len(row) if isinstance(row, list) else -1 for row in matrix] != [p] * p:
+        raise UserError(f"{where}: correlation.matrix needs {p} rows and columns, one for each name", argument="random")
+    if doubled := [name for k, name in enumerate(names) if name in names[:k]]:
+        raise UserError(f"{where}: correlation.names has {doubled[0]} twice", argument="random")
+    pairs = [(i, j) for i in range(p) for j in range(p)]
+    called = {(i, j): f"correlation.matrix[{i}][{j}], of {names[i]} with {names[j]}," for i, j in pairs}
+    found = np.reshape([_entry(where, called[i, j], {"": matrix[i][j]}, "") for i, j in pairs], (p, p))
+    for i, j in pairs:
+        if abs(found[i, j]) > 1 + EXACT or (i == j and abs(found[i, j] - 1) > EXACT):
+            right = "1" if i == j else "between -1 and 1"
+            raise UserError(f"{where}: {called[i, j]} is {found[i, j]:g}; it must be {right}", argument="random")
+        if abs(found[i, j] - found[j, i]) > EXACT:
+            raise UserError(
+                f"{where}: {called[i, j]} is {found[i, j]:g}, but {found[j, i]:g} in the other order", argument="random"
+            )
+    if p and (least := float(np.linalg.eigvalsh(found)[0])) < -EXACT * p:
+        raise UserError(
+            f"{where}: correlation.matrix has the eigenvalue {least:.3g}; no parameters have such correlations",
+            argument="random",
+        )
+    return found
 
 
 def tabulated(table: Table | str | os.PathLike[str], testbed: Testbed, fixed: Mapping[str, Any]) -> dict[str, Array]:
@@ -101,6 +151,7 @@ def tabulated(table: Table | str | os.PathLike[str], testbed: Testbed, fixed: Ma
         path = Path(table)  # type: ignore[arg-type]
         where = str(path)
         try:
+            check_regular(path)
             read = parquet.read_table(path) if path.suffix == ".parquet" else csv.read_csv(path)
         except (OSError, pa.ArrowException) as error:
             raise UserError(f"{where} cannot be read ({error})", argument="table") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
@@ -15,7 +16,7 @@ import numpy as np
 
 from prw.batch import Part
 from prw.errors import UserError
-from prw.files import locked, replacing
+from prw.files import check_regular, locked, replacing
 from prw.motion import Array
 
 if TYPE_CHECKING:
@@ -27,6 +28,19 @@ KEY = b"prw.sweep"
 #: of a cluster share them, but at least SMALLEST if these are not too long.
 SAMPLES, SHARES, SMALLEST = 10_000_000, 16, 16
 TABLE, PARTS, TRAJECTORIES = "runs.parquet", "parts", "trajectories"
+#: Key of the checksum in the metadata, with which a file is compared before a sweep continues from it.
+CHECKSUM = b"prw.sha256"
+#: Entries that are needed to repeat a sweep, and their types.
+ENTRIES = {
+    "parameters": dict,
+    "outputs": list,
+    "statistics": list,
+    "varied": list,
+    "values": str,
+    "motion": dict,
+    "fmu": dict,
+    "versions": dict,
+}
 
 
 def part_size(runs: int, samples: int) -> int:
@@ -49,18 +63,27 @@ def versions() -> dict[str, str]:
 
 
 def record_in(path: Path) -> dict[str, Any]:
-    """The record that a file of a sweep contains. Raises UserError if there is none."""
+    """The record that a file of a sweep contains. Raises UserError if there is none, or if it lacks an entry."""
     import pyarrow as pa
     from pyarrow import parquet
 
     try:
-        return dict(json.loads((parquet.read_schema(path).metadata or {})[KEY]))
+        check_regular(path)
+        metadata = parquet.read_schema(path).metadata
     except (OSError, pa.ArrowException) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    except KeyError:
-        raise UserError(
-            f"{path}: has no record of its sweep, because something else or an older prw wrote it"
-        ) from None
+        raise Unreadable(f"{path}: cannot be read ({error})") from None
+    try:
+        record = json.loads((metadata or {})[KEY])
+        complete = all(isinstance(record[name], kind) for name, kind in ENTRIES.items())
+    except (KeyError, TypeError, ValueError, RecursionError):
+        complete = False
+    if not complete:
+        raise UserError(f"{path}: has no record of its sweep, because something else or an older prw wrote it")
+    return dict(record)
+
+
+class Unreadable(UserError):
+    """A file is not a Parquet file, or damaged."""
 
 
 class Parts:
@@ -77,6 +100,11 @@ class Parts:
         self.runs = len(next(iter(values.values())))
         #: slice: the runs of each part.
         self.slices = [slice(first, min(first + size, self.runs)) for first in range(0, self.runs, size)]
+        self._kinds = (PARTS, TRAJECTORIES) if record["trajectories"] else (PARTS,)
+        #: Whether the table of all runs is on disk, and the files of finished parts that are.
+        self._whole, self._sound = False, set[Path]()
+        #: A message for each damaged file, whose runs will be repeated.
+        self.notes: list[str] = []
 
     @property
     def are_on_disk(self) -> bool:
@@ -85,32 +113,55 @@ class Parts:
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[None]:
-        """Lock the directory. Raises UserError if it cannot be written, if another process uses it, or if it contains another sweep."""
+        """Lock the directory and check every file in it. Raises UserError if the directory cannot be written, if another process uses
+        it, or if it contains another sweep. Damaged files of this sweep count as missing, and `notes` has a message for each."""
         if self._directory is None:
             yield
             return
         with locked(self._directory):
-            for kind in (TABLE, f"{PARTS}/*.parquet", f"{TRAJECTORIES}/*.parquet"):
-                for path in sorted(self._directory.glob(kind))[:1]:
-                    self._check(path)
+            self._whole = self._is_sound(self._directory / TABLE, slice(0, self.runs))
+            for kind in (PARTS, TRAJECTORIES):
+                own = {self._path(kind, index): part for index, part in enumerate(self.slices)}
+                # Temporary files of killed processes begin with a dot.
+                for path in sorted((self._directory / kind).glob("[!.]*")):
+                    if path not in own:
+                        raise UserError(f"{path}: is not a part of this sweep; {self._remedy}")
+                self._sound |= {path for path, part in own.items() if self._is_sound(path, part)}
             yield
 
-    def _check(self, path: Path) -> None:
-        remedy = f"write into another directory, or remove {self._directory}"
+    @property
+    def _remedy(self) -> str:
+        return f"write into another directory, or remove {self._directory}"
+
+    def _is_sound(self, path: Path, runs: slice) -> bool:
+        """Whether the file exists and contains these runs of this sweep as they were written. Raises UserError if it is not from this
+        sweep."""
+        if not os.path.lexists(path):
+            return False
         try:
-            other = record_in(path)
+            record = record_in(path)
         except UserError as error:
-            raise UserError(f"{error}; {remedy}") from None
-        if difference := _difference(other, json.loads(self._text)):
-            raise UserError(f"{path} is from a sweep with other arguments ({difference}); {remedy}")
+            # Only its path shows from which sweep a file is that cannot be read. A table may be from anywhere.
+            if not isinstance(error, Unreadable) or path.name == TABLE:
+                raise UserError(f"{error}; {self._remedy}") from None
+            damage = str(error)
+        else:
+            if difference := _difference(record, json.loads(self._text)):
+                raise UserError(f"{path} is from a sweep with other arguments ({difference}); {self._remedy}")
+            damage = _damage(path, runs)
+        if damage:
+            self.notes.append(f"{damage}, so runs {runs.start} to {runs.stop - 1} are repeated")
+        return not damage
 
     def missing(self) -> dict[int, slice]:
         """The runs of each unfinished part, by its index."""
-        if self._directory is not None and (self._directory / TABLE).is_file():
-            return {}
-        return {
-            k: part for k, part in enumerate(self.slices) if k not in self._kept and not self._path(PARTS, k).is_file()
-        }
+        return {k: part for k, part in enumerate(self.slices) if not self._is_finished(k)}
+
+    def _is_finished(self, index: int) -> bool:
+        if self._directory is None:
+            return index in self._kept
+        needed = {self._path(kind, index) for kind in self._kinds if kind != PARTS or not self._whole}
+        return needed <= self._sound
 
     def keep(self, index: int, found: Part) -> None:
         """Add a finished part."""
@@ -125,62 +176,85 @@ class Parts:
             **{name: column[part] for name, column in self._values.items()},
             **{name: pa.array(column, mask=failed) for name, column in found.measured.items()},
         }
-        table = self._with_record(pa.table(columns))
         if self._directory is None:
-            self._kept[index] = table
+            self._kept[index] = pa.table(columns)
             return
         if found.trajectories:
             time = found.trajectories["time"]
             outputs = {name: values.ravel() for name, values in found.trajectories.items() if name != "time"}
-            columns = {"run": np.repeat(runs, len(time)), "time": np.tile(time, len(runs)), **outputs}
-            # First, because a part without trajectories would count as finished.
-            _write(self._path(TRAJECTORIES, index), self._with_record(pa.table(columns)))
-        _write(self._path(PARTS, index), table)
+            kept = {"run": np.repeat(runs, len(time)), "time": np.tile(time, len(runs)), **outputs}
+            self._write(self._path(TRAJECTORIES, index), pa.table(kept))
+        self._write(self._path(PARTS, index), pa.table(columns))
 
     def table(self) -> pyarrow.Table:
         """A row for each run of the finished parts."""
         import pyarrow as pa
-        from pyarrow import parquet
 
         if self._directory is None:
             tables = [self._kept[index] for index in sorted(self._kept)]
-        elif (path := self._directory / TABLE).is_file():
-            return parquet.read_table(path)
+        elif self._whole:
+            tables = [_read(self._directory / TABLE)]
         else:
-            paths = (self._path(PARTS, index) for index in range(len(self.slices)))
-            tables = [parquet.read_table(path, partitioning=None) for path in paths if path.is_file()]
+            tables = [_read(self._path(PARTS, index)) for index in range(len(self.slices)) if self._is_finished(index)]
+        if not tables:
+            return None
         # One chunk, so that the bytes of the file do not depend on the parts.
-        return pa.concat_tables(tables).combine_chunks() if tables else None
+        return pa.concat_tables(tables).combine_chunks().replace_schema_metadata({KEY: self._text})
 
     def finish(self) -> pyarrow.Table:
         """Write the table of all runs, remove their parts, and return it."""
         table = self.table()
         if self._directory is not None:
-            if not (path := self._directory / TABLE).is_file():
-                _write(path, table)
+            if not self._whole:
+                self._write(self._directory / TABLE, table)
             shutil.rmtree(self._directory / PARTS, ignore_errors=True)
         return table
 
     def _path(self, kind: str, index: int) -> Path:
         return (self._directory or Path()) / kind / f"part-{index:05}.parquet"
 
-    def _with_record(self, table: pyarrow.Table) -> pyarrow.Table:
-        return table.replace_schema_metadata({KEY: self._text})
+    def _write(self, path: Path, table: pyarrow.Table) -> None:
+        from pyarrow import parquet
+
+        metadata = {KEY: self._text, CHECKSUM: _checksum(table)}
+        with replacing(path) as temporary:
+            parquet.write_table(table.replace_schema_metadata(metadata), temporary)
+        self._sound.add(path)
 
 
-def finished_runs(directory: Path) -> int:
-    """Number of runs in the finished parts of a sweep in the directory."""
+def _read(path: Path) -> pyarrow.Table:
     from pyarrow import parquet
 
-    paths = [*directory.glob(TABLE), *directory.glob(f"{PARTS}/*.parquet")]
-    return sum(parquet.read_metadata(path).num_rows for path in paths)
+    # Directory names are not columns.
+    return parquet.read_table(path, partitioning=None)
 
 
-def _write(path: Path, table: pyarrow.Table) -> None:
-    from pyarrow import parquet
+def _damage(path: Path, runs: slice) -> str:
+    """Describes how the rows of a file differ from the rows that were written; empty if they do not."""
+    import pyarrow as pa
 
-    with replacing(path) as temporary:
-        parquet.write_table(table, temporary)
+    try:
+        table = _read(path)
+    except (OSError, pa.ArrowException) as error:
+        return f"{path}: cannot be read ({error})"
+    if (table.schema.metadata or {}).get(CHECKSUM) != _checksum(table):
+        return f"{path}: was changed after it was written"
+    # Trajectories have several rows for each run.
+    if not np.array_equal(np.unique(table["run"].to_numpy()), np.arange(runs.start, runs.stop)):
+        return f"{path}: contains other runs"
+    return ""
+
+
+def _checksum(table: pyarrow.Table) -> bytes:
+    """SHA-256 of the names, types and values of a table."""
+    found = hashlib.sha256()
+    for name, column in zip(table.column_names, table.columns):
+        found.update(json.dumps([name, str(column.type), len(column)]).encode())
+        if column.type in ("int64", "double"):
+            found.update(column.is_null().to_numpy().tobytes() + column.fill_null(0).to_numpy().tobytes())
+        else:
+            found.update(json.dumps(column.to_pylist(), default=str).encode())
+    return found.hexdigest().encode()
 
 
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import fmu_run
 from numpy.typing import ArrayLike
 
-from prw.arguments import Given, Table, check_names, counted, names_of, values_of
+from prw.arguments import Given, Table, check_names, counted, names_of, numbers_of, values_of
 from prw.batch import Part, Request, run_part
 from prw.draws import Joint, Random, joint_of, layout, tabulated
 from prw.errors import Interrupted, UserError, need
@@ -48,6 +48,7 @@ def sweep(
     scheduler: str | None = None,
     fmu: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> pyarrow.Table:
     """Run the testbed with many sets of parameters.
 
@@ -91,6 +92,8 @@ def sweep(
         A directory, in which the table is written as runs.parquet. Until then, finished runs are in its directory `parts`. If the
         sweep is interrupted, the same call continues it; with other arguments, it raises UserError. Without `out`, the finished runs
         are in the attribute `table` of the exception KeyboardInterrupt.
+    progress
+        Called with the numbers of finished runs and of all runs: first with the runs that are kept from `out`, then repeatedly.
 
     Returns
     -------
@@ -108,6 +111,8 @@ def sweep(
 
     Warns
     -----
+    UserWarning
+        A file in `out` is damaged, so its runs are repeated.
     RuntimeWarning
         All runs failed.
     """
@@ -141,7 +146,9 @@ def sweep(
         size = part_size(len(next(iter(values.values()))), samples)
         parts = Parts(record, values, size, None if out is None else Path(out))
         with parts.opened():
-            found = _complete(parts, testbed, request, values, threads, scheduler)
+            for note in parts.notes:
+                warnings.warn(note, UserWarning, stacklevel=2)
+            found = _complete(parts, testbed, request, values, threads, scheduler, progress)
     if "done" not in found["status"].to_pylist():
         warnings.warn(f"all {found.num_rows} runs failed; run 0: {found['message'][0]}", RuntimeWarning, stacklevel=2)
     return found
@@ -185,35 +192,53 @@ def _record(request: Request, values: Mapping[str, Array], testbed: Testbed) -> 
 
 def _recorded(path: Path, testbed: Testbed, motion: Motion) -> tuple[Request, dict[str, Array], dict[str, Any]]:
     """The sweep whose result is a file. Raises UserError if the motion or the FMU are not those of the sweep."""
+    import pyarrow as pa
     from pyarrow import parquet
 
     record = record_in(path)
-    values = {
-        name: column.to_numpy()
-        for name, column in zip(record["varied"], parquet.read_table(path, columns=record["varied"]))
-    }
+    try:
+        read = parquet.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    values = {name: numbers_of(f"{path}: {name}", read[name]) for name in record["varied"] if name in read.column_names}
     chosen = tuple(record["outputs"]), tuple(record["statistics"])
     request = Request(motion, record["parameters"], *chosen, record["trajectories"])
     now = _record(request, values, testbed)
-    if record["motion"]["sha256"] != now["motion"]["sha256"]:
+    if record["values"] != now["values"]:
+        raise UserError(f"{path}: its parameters were changed after the sweep, so it cannot be repeated")
+    if record["motion"].get("sha256") != now["motion"]["sha256"]:
         raise UserError(
-            f"the sweep had another motion, {record['motion']['name']}; give that motion, not {motion.name}",
+            f"the sweep had another motion, {record['motion'].get('name')}; give that motion, not {motion.name}",
             argument="motion",
         )
     if record["fmu"] != now["fmu"]:
         raise UserError(
-            f"the sweep ran the FMU with the guid {record['fmu']['guid']}, {testbed.fmu} is another one", argument="fmu"
+            f"the sweep ran the FMU with the guid {record['fmu'].get('guid')}, {testbed.fmu} is another one",
+            argument="fmu",
         )
     return request, values, {**record, "versions": now["versions"]}
 
 
 def _complete(
-    parts: Parts, testbed: Testbed, request: Request, values: Mapping[str, Array], threads: int, scheduler: str | None
+    parts: Parts,
+    testbed: Testbed,
+    request: Request,
+    values: Mapping[str, Array],
+    threads: int,
+    scheduler: str | None,
+    progress: Callable[[int, int], None] | None,
 ) -> pyarrow.Table:
     """Carry out the missing runs, and return the table of all."""
     missing = parts.missing()
     done = parts.runs - sum(part.stop - part.start for part in missing.values())
-    with Progress(f"{parts.runs} runs", parts.runs) as progress, contextlib.ExitStack() as stack:
+    with Progress(f"{parts.runs} runs", parts.runs) as shown, contextlib.ExitStack() as stack:
+
+        def report(finished: int) -> None:
+            shown(finished)
+            if progress is not None:
+                progress(finished, parts.runs)
+
+        report(done)
         if not missing:
             results: Iterator[tuple[int, Part]] = iter(())
         elif scheduler:
@@ -231,7 +256,7 @@ def _complete(
                         request,
                         {n: v[part] for n, v in values.items()},
                         threads,
-                        lambda now, _: progress(done + now),
+                        lambda now, _: report(done + now),
                     ),
                 )
                 for k, part in missing.items()
@@ -240,7 +265,7 @@ def _complete(
             for index, found in results:
                 parts.keep(index, found)
                 done += missing[index].stop - missing[index].start
-                progress(done)
+                report(done)
         except KeyboardInterrupt:
             more = "; start the same sweep again to continue" if parts.are_on_disk else ""
             raise Interrupted(f"{done} of {parts.runs} runs are finished{more}", parts.table()) from None
@@ -252,4 +277,6 @@ def repeated(before: str | os.PathLike[str], now: pyarrow.Table) -> list[str]:
     from pyarrow import parquet
 
     earlier = parquet.read_table(before)
-    return [name for name in now.column_names if not now[name].equals(earlier[name])]
+    names = dict.fromkeys([*now.column_names, *earlier.column_names])
+    both = {*now.column_names} & {*earlier.column_names}
+    return [name for name in names if name not in both or not now[name].equals(earlier[name])]

@@ -23,14 +23,21 @@ FMU = "the testbed FMU (default: the FMU that PRW_FMU names, else the FMU in thi
 T = TypeVar("T")
 
 
-def call(function: Callable[..., T], arguments: argparse.Namespace, **others: Any) -> T:
+def call(function: Callable[..., T], arguments: argparse.Namespace, notes: list[str] | None = None, **others: Any) -> T:
     """Call the function with the options that have the names of its parameters, and with `others`.
 
-    Ignores the function's warnings about its results, because commands print these themselves."""
+    The function's warnings about its results are not shown, because commands print these themselves. notes: gets the messages of
+    its UserWarnings."""
     names = inspect.signature(function).parameters
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", module=__name__)
-        return function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("always", module=__name__)
+        found = function(**{name: value for name, value in vars(arguments).items() if name in names} | others)
+    for each in caught:
+        if each.filename != __file__:
+            warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+        elif notes is not None and each.category is UserWarning:
+            notes.append(str(each.message))
+    return found
 
 
 def show(*lines: str) -> None:

@@ -18,7 +18,7 @@ from prw.commands.options import DEFAULT_OUT, Named, add_paths, add_unit_options
 from prw.draws import SAMPLINGS
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
-from prw.parts import TABLE, TRAJECTORIES, finished_runs
+from prw.parts import TABLE, TRAJECTORIES
 from prw.recording import read_motion
 from prw.sweeps import STATISTICS, repeated, sweep
 from prw.testbed import OUTPUTS
@@ -125,15 +125,22 @@ def run(arguments: argparse.Namespace) -> None:
     need("pyarrow")
     if arguments.again is not None and arguments.out == DEFAULT_OUT / "sweep":
         arguments.out = arguments.out.with_name("sweep-again")
-    earlier, begin = finished_runs(arguments.out), time.monotonic()
+    finished: list[int] = []
+    notes: list[str] = []
+    begin = time.monotonic()
     table = call(
         sweep,
         arguments,
+        notes,
+        progress=lambda done, _: finished.append(done),
         motion=motion,
         grid=arguments.grid or None,
         random=arguments.identified or arguments.random or None,
     )
-    seconds, count = time.monotonic() - begin, table.num_rows - earlier
+    earlier, seconds = finished[0], time.monotonic() - begin
+    count = table.num_rows - earlier
+    for note in notes:
+        show(f"note        {note}")
     if earlier:
         show(f"kept        {earlier} finished runs in {arguments.out}")
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
