@@ -178,6 +178,43 @@ def test_coarse_sampling_is_reported(testbed: Path, rates: bool) -> None:
     assert fine.sampling_errors["tau1"] < 0.003 and fine.doubt == ""
 
 
+@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("phase", [0.0, 0.8, 4.0])
+def test_a_recording_that_begins_in_motion(testbed: Path, rates: bool, phase: float) -> None:
+    """The reported error covers the difference from a recording of the same sines that begins 10 s earlier, and the reported time is
+    the time for which it matters. After that, the sampling error is the true one, which is below 1 %."""
+
+    def motion(begin: float, rate: int, with_rates: bool) -> prw.Motion:
+        time = np.arange(round((2 - begin) * rate) + 1) / rate + begin
+        angles = [0.3 * np.sin(12 * time + phase), 0.15 * np.sin(15 * time + phase / 2)]
+        omega = [3.6 * np.cos(12 * time + phase), 2.25 * np.cos(15 * time + phase / 2)]
+        return prw.Motion(time, np.transpose(angles), np.transpose(omega) if with_rates else None)
+
+    with pytest.warns(UserWarning, match=r"begins in motion \(theta\d turns at .*leave out these results") as noted:
+        run = prw.simulate(motion(0.0, 1000, rates), fmu=testbed)
+    assert len(noted) == 1 and run.notes == [str(noted[0].message)] and run.beginning is not None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        longer = prw.simulate(motion(-10.0, 4000, True), fmu=testbed)
+    errors = [np.abs(run[name] - longer[name][40_000::4]) / np.abs(run[name]).max() for name in run]
+    assert np.max(errors) < run.beginning.error < 2 * np.max(errors)
+    assert np.max(np.array(errors)[:, run.time > run.beginning.lasts]) < 0.01 and run.beginning.lasts < 0.6
+    assert max(run.sampling_errors.values()) < 0.01
+
+
+def test_noise_and_steps_of_encoders_are_not_motion(fmu: Path) -> None:
+    """A recording begins in motion only if its angles change by more than their noise."""
+    time, random = np.arange(501) / 1000, np.random.default_rng(1)
+    moved = 0.3 * np.maximum(time - 0.1, 0) ** 2
+    for resolution, noise in [(1e-3, 0.0), (1e-3, 1e-3), (0.0, 1e-4)]:
+        for _ in range(5):
+            angle = moved + noise * random.standard_normal(len(time))
+            angle = np.round(angle / resolution) * resolution if resolution else angle
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                assert prw.simulate(prw.Motion(time, np.outer(angle, [1, -1])), fmu=fmu).beginning is None
+
+
 def test_the_rates_of_coarse_sampling() -> None:
     """Rates are written without exponents, and the proposed rate is above the given rate even if 1 % is barely exceeded."""
     motion = prw.Motion(np.arange(1001) / 1000, np.zeros((1001, 2)))
@@ -222,6 +259,9 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"parameters": {"N": 7.5}}, "N.* 7.5"),
         ({"parameters": {"k1": np.array([1.0, 2.0])}}, r"k1 is array\(\[1., 2.\]\), not a number; prw.sweep takes"),
         ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),
+        ({"parameters": {"k1": ("stiff", "N.m/deg")}}, r"k1 is \('stiff', 'N.m/deg'\); write finite numbers"),
+        ({"parameters": {"k1": (None, "N.m/deg")}}, r"k1 is \(None, 'N.m/deg'\); write finite numbers"),
+        ({"parameters": {"k1": ([[1.0], [1.0, 2.0]], "N.m/deg")}}, r"k1 is \(\[\[1.0\], .* write finite numbers"),
         ({"parameters": {"k1": None}}, "k1 is None, not a number"),
         ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
         ({"outputs": None}, "outputs: None is neither a name nor a sequence of names"),

@@ -16,8 +16,6 @@ PLAUSIBLE_SPEED = 30.0
 PLAUSIBLE_ANGLE = 4 * np.pi
 #: Motion of a motor, in rad, below which its rate is not compared with its angle. Near a gap, a tenth of this counts as motion.
 SMALL_MOVE = 0.02
-#: Rate in rad/s up to which a motor counts as at rest in the first row.
-SLOW = 0.1
 #: Mean time between two samples in s above which the unit is probably wrong: milliseconds that are read as seconds.
 SLOW_SAMPLING = 0.5
 #: Rows are missing if the time between two rows is more than this multiple of the median.
@@ -90,8 +88,6 @@ def notes_on_values(path: Path, time: Array, theta: Array, omega: Array | None, 
             "are noisy, too; record omega1 and omega2 if you can"
         )
         return notes
-    if np.abs(omega[0]).max() > SLOW:
-        notes.append("the motors turn already in the first row; the testbed starts at rest and has to catch up")
     notes += [note for side in (0, 1) if (note := _mismatch(time, theta[:, side], omega[:, side], side))]
     return notes
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from prw.arguments import Given, Table, check_names, names_of, values_of
+from prw.beginning import ROUNDING, Beginning, beginning
 from prw.columns import MEASURED, QUANTITIES, si_unit
 from prw.errors import need
 from prw.files import write_table
@@ -23,8 +24,6 @@ from prw.testbed import OUTPUTS, Testbed
 DOUBTFUL = 0.01
 #: The sampling error is estimated only if a second run, with every second sample, has at least this number of samples.
 MIN_TIMES = 8
-#: Peak below which an output is a rounding error.
-ROUNDING = 1e-12
 
 if TYPE_CHECKING:
     import pandas
@@ -46,6 +45,8 @@ class Run(Mapping[str, Array]):
         The largest error of each output that is caused by the sampling of the motors, as a fraction of the output's
         peak. They are estimated by a second run with every second sample. The mapping is empty if that run would be too
         short.
+    beginning
+        The effect of motors that turn already at the first sample, or None. The sampling errors are then those after its end.
     """
 
     def __init__(
@@ -54,14 +55,21 @@ class Run(Mapping[str, Array]):
         outputs: Mapping[str, Array],
         parameters: Mapping[str, Value],
         sampling_errors: Mapping[str, float] = {},
+        beginning: Beginning | None = None,
     ):
-        self.motion, self.parameters = motion, dict(parameters)
+        self.motion, self.parameters, self.beginning = motion, dict(parameters), beginning
         self._outputs, self.sampling_errors = dict(outputs), dict(sampling_errors)
 
     @property
     def notes(self) -> list[str]:
         """Notes for the user, for example on probable mistakes in the recording, and on a large sampling error."""
-        return [*self.motion.notes, *([self.doubt] if self.doubt else [])]
+        return [*self.motion.notes, *self.doubts]
+
+    @property
+    def doubts(self) -> list[str]:
+        """Warnings about a recording that begins in motion, and about a large sampling error."""
+        begins = [] if self.beginning is None else [str(self.beginning)]
+        return [*begins, *filter(None, [self.doubt])]
 
     @property
     def doubt(self) -> str:
@@ -177,7 +185,7 @@ def simulate(
     Warns
     -----
     UserWarning
-        The motors are sampled so coarsely that an output may be off by more than 1 % of its peak.
+        The motors turn at the first sample already, or are sampled so coarsely that an output may be off by more than 1 % of its peak.
     """
     moved = motion_of(motion)
     names = names_of("outputs", outputs)
@@ -187,22 +195,27 @@ def simulate(
         check_names("outputs", names, testbed.loaded.variables)
         found = testbed.respond(moved, names, given)
         other: dict[str, Array] = {}
+        begins = None
         if len(moved.time[::2]) >= MIN_TIMES:
             coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
             other = testbed.respond(coarse, names, given)
-    errors = {name: _sampling_error(found[name], other[name]) for name in other}
-    run = Run(moved, found, values, errors)
-    if run.doubt:
-        warnings.warn(run.doubt, UserWarning, stacklevel=2)
+            begins = beginning(moved, found, lambda longer: testbed.respond(longer, names, given))
+    settled = moved.time[0] + (0.0 if begins is None else begins.lasts)
+    # If all samples are at the beginning, the other warning covers the error.
+    late = slice(int(np.searchsorted(moved.time[::2], settled)), None)
+    errors = {name: _sampling_error(found[name], other[name], late) for name in other}
+    run = Run(moved, found, values, errors, begins)
+    for doubt in run.doubts:
+        warnings.warn(doubt, UserWarning, stacklevel=2)
     return run
 
 
-def _sampling_error(fine: Array, coarse: Array) -> float:
-    """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is the same output of a run with every
-    second sample. Errors are second order in the step size, so the error of `coarse` is four times the error of `fine`,
+def _sampling_error(fine: Array, coarse: Array, late: slice) -> float:
+    """The error of the output `fine` (n,) as a fraction of its peak, at the samples `late` of `coarse`, the same output of a run with
+    every second sample. Errors are second order in the step size, so the error of `coarse` is four times the error of `fine`,
     and their difference is three times the error of `fine`."""
     peak = float(np.abs(fine).max())
-    return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
+    return float(np.abs(coarse - fine[::2])[late].max(initial=0.0)) / 3 / peak if peak > ROUNDING else 0.0
 
 
 def _rounded_up(number: float) -> float:
