@@ -19,6 +19,8 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+import fmpy
+
 ROOT = Path(__file__).resolve().parents[2]
 LISTS = ROOT / "tests/faults"
 SOURCE_COPY = ROOT / "target/faults/sources"
@@ -78,14 +80,13 @@ def copy_sources() -> None:
 def tests_fail(arguments: str) -> bool:
     """Whether `cargo test` with these arguments fails in the copy, or takes longer than TIMEOUT."""
     # FMPy, which is installed with this interpreter, brings the headers of the C programs.
-    headers = next(Path(sys.prefix).glob("lib/python3*/site-packages/fmpy/c-code"), None)
-    environment = {"FMI2_HEADERS": str(headers)} if headers else {}
+    headers = Path(fmpy.__file__).parent / "c-code"
     command = ["cargo", "test", "--locked", "--quiet", *arguments.split()]
     # In a separate session, the tests that cargo has started are killed with it.
     with subprocess.Popen(
         command,
         cwd=SOURCE_COPY,
-        env={**os.environ, **environment, "CARGO_TARGET_DIR": str(SOURCE_COPY.parent / "target")},
+        env={**os.environ, "FMI2_HEADERS": str(headers), "CARGO_TARGET_DIR": str(SOURCE_COPY.parent / "target")},
         start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

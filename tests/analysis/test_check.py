@@ -229,6 +229,7 @@ def test_possible_causes(right, fmu, tmp_path, change, note):
         ("time,roll\n5,1\n6,2\n", "runs from 5 to 6 s"),
         ("time,roll [N.m]\n0,1\n1,2\n", "column roll: roll cannot be in 'N.m'"),
         ("time,theta1\n0,0\n1,0\n", "has none of the outputs tau1"),
+        ("time,roll,roll\n0,1,1\n1,2,3\n", "two columns are called roll"),
     ],
 )
 def test_tables_that_cannot_be_read(fmu, tmp_path, text, message):
@@ -287,6 +288,18 @@ def test_mat_files_that_cannot_be_read(fmu, tmp_path):
     for content in (b"something else", b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + nested):
         path.write_bytes(content)
         with pytest.raises(prw.UserError, match="cannot be read as a .mat file"):
+            prw.check(path, fmu=fmu)
+    ramp, short = np.arange(9.0), np.arange(5.0)
+    for variables, message in [
+        ({"time": ramp, "roll": ramp, "pitch": short}, r"different numbers of values \(time 9, roll 9, pitch 5\)"),
+        ({"a": {"time": ramp, "roll": ramp}, "b": {"time": short, "tau1": short}}, r"a.roll 9, b.time 5, b.tau1 5\)"),
+        (
+            {"a": {"time": ramp, "signals": np.array([{"values": x, "label": "roll"} for x in (ramp, -ramp)])}},
+            "two columns are called roll",
+        ),
+    ]:
+        savemat(path, variables)
+        with pytest.raises(prw.UserError, match=message):
             prw.check(path, fmu=fmu)
     savemat(path, {"roll": np.zeros(3)})
     with pytest.raises(prw.UserError, match="no vector time or tout; it has .*roll; save time and signals as vectors"):

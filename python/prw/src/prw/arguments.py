@@ -105,15 +105,22 @@ def columns_of(table: Any) -> dict[str, Any]:
 
 
 def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
-    """The values as a column (n,) of floats; masked values become NaN. Raises UserError, with a message that begins with `where`,
-    if they are not numbers or not one column."""
-    array = values.astype(np.float64).filled(np.nan) if np.ma.is_masked(values) else np.asarray(values)
-    if array.dtype.kind in "mM":
-        raise UserError(f"{where}: has dates or durations; write seconds as numbers")
+    """The values as a column (n,) of floats; masked and missing values become NaN. Raises UserError, with a message that begins with
+    `where`, if they are not numbers or not one column."""
+    if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
+        raise UserError(f"{where}: is a pair of values and a unit, but must be a column of numbers")
     try:
-        array = array.astype(np.float64)
+        masked = isinstance(values, np.ma.MaskedArray)
+        array = values.astype(np.float64).filled(np.nan) if masked else np.asarray(values)
+        dates = array.dtype.kind in "mM"
+        # pandas.NA cannot be converted.
+        if array.dtype.kind == "O" and hasattr(values, "isna"):
+            array = np.where(values.isna(), np.nan, array)
+        array = np.zeros(len(array)) if dates else array.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise UserError(f"{where}: does not consist of numbers ({error})") from None
+    if dates:
+        raise UserError(f"{where}: has dates or durations; write seconds as numbers")
     if array.ndim != 1:
         raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
     return array
@@ -155,7 +162,13 @@ def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
     if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
         return value
     try:
-        return loaded.converted(name, *value)
+        numbers = np.asarray(value[0], dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.array(np.nan)
+    if not np.isfinite(numbers).all():
+        raise UserError(f"{name} is {value!r}; write finite numbers and their unit", argument="parameters")
+    try:
+        return loaded.converted(name, numbers if numbers.ndim else value[0], value[1])
     except ValueError as error:
         raise UserError(str(error), argument="parameters") from None
 

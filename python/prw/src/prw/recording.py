@@ -151,6 +151,8 @@ def _read(
     check_names("units", units or {}, QUANTITIES)
     check_names("names", names, QUANTITIES)
     called = {header: name for name, header in names.items()}
+    if len(called) < len(names):
+        raise UserError(f"{names!r} names one column twice", argument="names")
     if skip < 0:
         raise UserError("it must be 0 or more lines", argument="skip", given=skip)
 
@@ -159,7 +161,7 @@ def _read(
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
         for name in called:
-            if not any(title.startswith(name) for title in header):
+            if not any(_is_called(title, name) for title in header):
                 raise UserError(f"{path}, row {line}: no column {name!r}; the header has {shown(header)}")
         found = columns(path, [_renamed(title, called) for title in header], line, measured, units, degrees)
         return found.taken
@@ -197,7 +199,8 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
         bad = ~np.isfinite(column) if name not in may_be_empty else np.isinf(column)
         if bad.any():
             first = int(bad.argmax())
-            why = "masked" if np.ma.getmaskarray(values[index])[first] else "not finite"
+            masked = isinstance(values[index], np.ma.MaskedArray) and np.ma.getmaskarray(values[index])[first]
+            why = "masked" if masked else "not finite"
             raise UserError(f"{IN_MEMORY}, column {name}: {column[first]} at index {first} is {why}")
         found.append(column)
     if len(found[0]) < 2:
@@ -207,7 +210,12 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
     return np.column_stack(found)
 
 
+def _is_called(title: str, name: str) -> bool:
+    """Whether a column title consists of the name and, perhaps, a unit."""
+    return re.fullmatch(re.escape(name) + r"\s*([\[(].*[\])])?", title) is not None
+
+
 def _renamed(title: str, names: Mapping[str, str]) -> str:
     """The column title with its name replaced as in `names`; a unit after the name is kept."""
-    name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", title)), key=len, default="")
+    name = max((n for n in names if _is_called(title, n)), key=len, default="")
     return names[name] + title.removeprefix(name) if name else title

@@ -137,7 +137,7 @@ def _rows(
         for count, row in enumerate(table):
             # Some tools end each row, but not the header, with a separator.
             if len(row) != width and not (len(row) == width + 1 and not row[-1].strip()):
-                if not row or row[0].startswith("#"):
+                if not any(map(str.strip, row)) or row[0].startswith("#"):
                     continue
                 number = "1 cell" if len(row) == 1 else f"{len(row)} cells"
                 raise UserError(f"{_where(path, table.line_num)}: {number}, but the header has {width}")
@@ -146,6 +146,9 @@ def _rows(
                 values = [float(row[i].replace(",", ".") if comma else row[i]) for i in indices]
             except ValueError:
                 values = [math.nan]
+                # Excel may end a table with rows of blank cells.
+                if not line.strip():
+                    continue
             # float() would take 1_000 for a thousand
             if "_" in line or not math.isfinite(sum(values)):
                 where = _where(path, table.line_num)

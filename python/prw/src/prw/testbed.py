@@ -98,14 +98,14 @@ class Testbed:
     def starts(self) -> dict[str, float]:
         """The start values of the Real parameters in SI, by name."""
         parameters = (v for v in self.loaded.variables.values() if v.causality == "parameter" and v.type in CONTINUOUS)
-        return {v.name: float(v.start or 0) for v in parameters}
+        return {v.name: float(_start_of(v)) for v in parameters}
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
         """The value of every parameter except strings and `use_omega`, in the FMU's units: `parameters`, and the start values
         of the others.
         Raises UserError for a name that is not a parameter, or a value that is not a number."""
         known = {
-            v.name: _value(v.type, v.start or "0")
+            v.name: _start_of(v)
             for v in self.loaded.variables.values()
             if v.causality == "parameter" and v.type != "String" and v.name != "use_omega"
         }
@@ -151,8 +151,11 @@ def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
     return {"inputs": inputs, "start": {"use_omega": motion.omega is not None, **start}}
 
 
-def _value(kind: str, start: str) -> Value:
-    """A start value in the format of the model description."""
-    if kind == "Boolean":
-        return start in ("true", "1")
-    return float(start) if kind in CONTINUOUS else int(start)
+def _start_of(variable: fmu_run.Variable) -> Value:
+    """The start value of a parameter that is not a String. Raises UserError if there is none that has this type."""
+    kind, start = variable.type, variable.start
+    booleans = {"true": True, "1": True, "false": False, "0": False}
+    try:
+        return booleans[str(start)] if kind == "Boolean" else float(start) if kind in CONTINUOUS else int(start)  # type: ignore[arg-type]
+    except (KeyError, TypeError, ValueError):
+        raise UserError(f"the parameter {variable.name} of the FMU has the start value {start!r}") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,6 +20,12 @@ from prw.motion import Array
 DIRECTORY = "extra/org.fmi-standard.fmi-ls-ref"
 
 Value = float | int | bool
+#: Functions that read the values of an SSV file, by the name of the element.
+READERS: dict[str, Callable[[str], Value]] = {
+    "Integer": int,
+    "Real": float,
+    "Boolean": {"true": True, "1": True, "false": False, "0": False}.__getitem__,
+}
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ def read_experiments(fmu: Path) -> list[Experiment]:
             ]
     except (OSError, zipfile.BadZipFile) as error:
         raise UserError(f"{fmu}: cannot be read ({error})") from None
-    except KeyError:
+    except (KeyError, ValueError):
         raise UserError(f"{fmu}: has no reference experiments; take the FMU of the testbed") from None
 
 
@@ -105,6 +111,5 @@ def _parameters(ssv: str) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for parameter in ElementTree.fromstring(ssv.encode()).iterfind(".//{*}Parameter"):
         kind, value = parameter[0].tag.rpartition("}")[2], parameter[0].attrib["value"]
-        number = int(value) if kind == "Integer" else float(value) if kind == "Real" else value == "true"
-        found[parameter.attrib["name"]] = number
+        found[parameter.attrib["name"]] = READERS[kind](value)
     return found

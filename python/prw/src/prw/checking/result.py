@@ -6,7 +6,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -126,7 +126,17 @@ def _csv(path: Path) -> dict[str, Array]:
         return taken
 
     values = read_table(path, choose)
-    return dict.fromkeys(titles, np.empty(0)) | {title: values[:, i] for i, (title, _) in enumerate(taken)}
+    columns = dict.fromkeys(titles, np.empty(0))
+    for i, (title, _) in enumerate(taken):
+        _add(path, columns, title, values[:, i])
+    return columns
+
+
+def _add(path: Path, columns: dict[str, Array], title: str, values: Array) -> None:
+    """Add a column. Raises UserError if another column has the title of a known one."""
+    if _known(title)[1] and len(columns.get(title, ())) and not np.array_equal(columns[title], values):
+        raise UserError(f"{path}: two columns are called {title}; rename or remove one")
+    columns[title] = values
 
 
 def _mat(path: Path) -> dict[str, Array]:
@@ -149,12 +159,20 @@ def _mat(path: Path) -> dict[str, Array]:
     columns: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith("__"):
-            columns.update(_of_variable(name, value))
-    lengths = [len(values) for name, values in columns.items() if _is_time(name)]
-    if not lengths:
+            for title, values in _of_variable(name, value):
+                _add(path, columns, title, values)
+    times = {name: len(values) for name, values in columns.items() if _is_time(name)}
+    if not times:
         hint = "; save time and signals as vectors: save('run.mat', 'time', 'roll', ..., '-v7')"
         raise UserError(f"{path}: there is no vector time or tout; it has {shown(list(content))}{hint}")
-    return {name: values for name, values in columns.items() if len(values) == lengths[0]}
+    known = {name: len(values) for name, values in columns.items() if _known(name)[1]}
+    lengths = {length for name, length in known.items() if name not in times} or {*times.values()}
+    if len(lengths) > 1 or not lengths <= {*times.values()}:
+        sizes = ", ".join(f"{name} {length}" for name, length in known.items())
+        raise UserError(
+            f"{path}: its columns have different numbers of values ({sizes}); save those of one recording only"
+        )
+    return {name: values for name, values in columns.items() if len(values) in lengths}
 
 
 def _check_size(path: Path) -> None:
@@ -193,24 +211,22 @@ def _is_time(title: str) -> bool:
     return title.rpartition(".")[2].lower() in ("time", "tout", "t")
 
 
-def _of_variable(name: str, value: Any) -> dict[str, Array]:
-    """The columns in a variable of MATLAB: a vector, a structure with vectors as fields, or a structure with time as Simulink logs
-    it (`time`, and `signals` with a label and values each). Other variables have no columns."""
+def _of_variable(name: str, value: Any) -> Iterator[tuple[str, Array]]:
+    """The columns in a variable of MATLAB, with their titles: a vector, a structure with vectors as fields, or a structure with time as
+    Simulink logs it (`time`, and `signals` with a label and values each). Other variables have no columns."""
     if hasattr(value, "_fieldnames"):
-        found: dict[str, Array] = {}
         for field in value._fieldnames:
             inner = getattr(value, field)
             if field == "signals":
                 for signal in np.atleast_1d(inner):
                     title = str(signal.label) if np.size(signal.label) else str(getattr(signal, "blockName", ""))
-                    found.update(_of_variable(title, signal.values))
+                    yield from _of_variable(title, signal.values)
             else:
-                found.update(_of_variable(f"{name}.{field}", inner))
-        return found
+                yield from _of_variable(f"{name}.{field}", inner)
+        return
     array = np.asarray(value)
     if array.ndim == 1 and len(array) > 1 and array.dtype.kind in "fiub":
-        return {name: array.astype(np.float64)}
-    return {}
+        yield name, array.astype(np.float64)
 
 
 def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
