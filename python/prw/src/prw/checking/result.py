@@ -27,6 +27,9 @@ LARGEST = 256 << 20
 #: array of structures is a Python object.
 _BYTES = {"single": 4, "int32": 4, "uint32": 4, "int16": 2, "uint16": 2, "int8": 1, "uint8": 1, "logical": 1, "char": 4}
 _BYTES |= {"cell": 1000, "struct": 1000}
+#: Types of elements in a .mat file of format 5, and classes of arrays.
+ARRAY, COMPRESSED = 14, 15
+CELLS, STRUCTURES, OBJECTS, SPARSE = 1, 2, 3, 5
 #: The default component if columns of several components have the same name.
 TESTBED = "testbed"
 
@@ -177,34 +180,58 @@ def _mat(path: Path) -> dict[str, Array]:
 
 def _check_size(path: Path) -> None:
     """Raises UserError if the arrays of a .mat file take more memory than allowed: a file of a few bytes may declare or contain, in
-    compressed form, arrays of any size."""
+    compressed form, arrays of any size, also within cells and structures."""
     from scipy.io import whosmat
 
     too_large = UserError(
         f"{path}: has more than {LARGEST >> 20} MB of values; save only time, motors and outputs, or fewer samples"
     )
     with open(path, "rb") as file:
-        size = os.fstat(file.fileno()).st_size
+        size, objects = os.fstat(file.fileno()).st_size, 0
         header = file.read(128)
         if header[126:128] == b"IM" and header[124:126] == b"\x00\x01":
-            # Format 5: elements with the type and the number of bytes, some of which are compressed (15).
+            # Format 5: elements with the type and the number of bytes.
             size = 128
             while len(tag := file.read(8)) == 8:
                 kind, length = np.frombuffer(tag, "<u4").tolist()
-                inflate, rest = zlib.decompressobj(), length
-                while kind == 15 and rest and (chunk := file.read(min(rest, 1 << 16))):
-                    rest -= len(chunk)
-                    while chunk and size <= LARGEST:
-                        size += len(inflate.decompress(chunk, 1 << 20))
-                        chunk = inflate.unconsumed_tail
-                size += rest
+                if length > LARGEST:
+                    raise too_large
+                content = memoryview(tag + file.read(length))
+                if kind == COMPRESSED:
+                    inflate = zlib.decompressobj()
+                    content = memoryview(inflate.decompress(content[8:], LARGEST + 1))
+                size += len(content)
                 if size > LARGEST:
                     raise too_large
-                file.seek(rest, os.SEEK_CUR)
+                objects += _objects(content)
     values = sum(math.prod(shape) * _BYTES.get(kind, 8) for _, shape, kind in whosmat(path))
-    # Values of small types are stored in less space than they take, and structures contain further arrays.
-    if max(size, values) > LARGEST:
+    # Values of small types are stored in less space than they take.
+    if max(size, values, objects * _BYTES["cell"]) > LARGEST:
         raise too_large
+
+
+def _objects(element: memoryview) -> int:
+    """The number of elements of all cell arrays and arrays of structures in an array of format 5. Raises ValueError if an array
+    declares more elements than the file contains bytes for them."""
+    kind, length = np.frombuffer(element[:8], "<u4").tolist()
+    if kind != ARRAY:
+        return 0
+    parts, at, found = [], 8, 0
+    while at + 8 <= min(len(element), 8 + length):
+        kind, size = np.frombuffer(element[at : at + 8], "<u4").tolist()
+        # An element of at most four bytes has its size in the upper half of its type.
+        small = kind >> 16 != 0
+        content = element[at + 4 : at + 4 + (kind >> 16)] if small else element[at + 8 : at + 8 + size]
+        parts.append((content, element[at : at + 8 + size]))
+        at += 8 if small else 8 + size + -size % 8
+    # The first three parts are the class, the shape and the name.
+    of_class, shape = parts[0][0][0], np.frombuffer(parts[1][0], "<i4").astype(np.int64)
+    count = math.prod(shape.tolist())
+    if (shape < 0).any() or (count > length and of_class != SPARSE):
+        raise ValueError(f"an array of {' x '.join(map(str, shape))} elements in {length} bytes")
+    if of_class in (CELLS, STRUCTURES, OBJECTS):
+        found = count + sum(_objects(whole) for _, whole in parts[3:])
+    return found
 
 
 def _is_time(title: str) -> bool:
