@@ -7,13 +7,14 @@ that suit the nominal wrist may be bad for others, so the example chooses gains 
 """
 
 import time as clock
-from pathlib import Path
 
 import fmu_run
 import numpy as np
 from matplotlib.figure import Figure
 
-SSP = Path("target/fmu/prw_closed_loop.ssp")
+import prw
+
+SSP = prw.default_fmu().with_name("prw_closed_loop.ssp")
 STEP, LENGTH, KEPT = 1e-3, 1.2, 5  # s; s; every fifth sample is kept
 WRISTS = 100
 GOAL = {"pitch_ref": np.deg2rad(20.0), "roll_ref": np.deg2rad(30.0)}

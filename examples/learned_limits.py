@@ -30,7 +30,7 @@ def limited(action: np.ndarray, motors: np.ndarray) -> np.ndarray:
 
 
 TASK = Task(
-    fmu="target/fmu/prw_testbed.fmu",
+    fmu=prw.default_fmu(),
     actions={"acceleration1": (-1.0, 1.0), "acceleration2": (-1.0, 1.0)},
     inputs=("theta1", "theta2", "omega1", "omega2"),
     to_inputs=limited,

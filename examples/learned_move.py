@@ -13,6 +13,8 @@ import numpy as np
 from fmu_run.gymnasium import Task, VectorEnv
 from matplotlib.figure import Figure
 
+import prw
+
 STEP, MOVE, AFTER, GOAL = 2e-3, 0.17, 0.3, np.deg2rad(20)  # s, and rad of pitch
 POLE = -9.683 + 34.678j  # of pitch, 1/s: needed by the shapers
 VARIED = {"k1": 2.11 * 180 / np.pi, "J3": 1.275e-2, "H3": 4.236e-2}  # Table 1; each varies by 20 % either way
@@ -32,7 +34,7 @@ def shaped(impulses: int, duration: float) -> np.ndarray:
 def wrists(count: int) -> VectorEnv:
     """Environments of random wrists. Action: rate of both motors. Reward: negative squared error after MOVE."""
     task = Task(
-        fmu="target/fmu/prw_testbed.fmu",
+        fmu=prw.default_fmu(),
         actions={"rate": (-RATE, RATE)},
         inputs=("theta1", "theta2", "omega1", "omega2"),
         to_inputs=lambda rate, motors: np.hstack([motors[:, :2] + STEP * motors[:, 2:], rate, rate]),

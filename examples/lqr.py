@@ -101,7 +101,7 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     time = STEP * np.arange(STEPS)
     angle = np.deg2rad([30, 50]) * np.sin(np.pi * np.outer(time, [0.9, 0.6])) ** 2
     noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
-    with Fmu("target/fmu/prw_controller.fmu") as fmu:
+    with Fmu(prw.default_fmu().with_name("prw_controller.fmu")) as fmu:
         errors = {"PI": follow(pi(fmu.instances(), angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     axes = figure.subplots(1, 2, sharex=True)

@@ -95,7 +95,7 @@ def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str
     """Control, print and draw; returns the figure, and the errors of pitch and roll (times, 2) by name, deg."""
     figure, errors, rates = Figure(figsize=(8, 3.2), layout="constrained"), {}, {}
     axes = figure.subplots(1, 2, sharex=True)
-    with Fmu("target/fmu/prw_testbed.fmu") as fmu:
+    with Fmu(prw.default_fmu()) as fmu:
         for name, colour in (("straight", "#D55E00"), ("planned", "#0072B2"), ("program", "#009E73")):
             begun = perf_counter()
             goal, wrist = follow(name, fmu, rollouts, length)

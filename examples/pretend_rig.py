@@ -41,7 +41,7 @@ def smoothly(motion: prw.Motion) -> prw.Motion:
 
 
 def with_friction(
-    motion: prw.Motion, truth: dict[str, float], friction: float, fmu: Path
+    motion: prw.Motion, truth: dict[str, float], friction: float, fmu: Path | None
 ) -> dict[str, NDArray[np.float64]]:
     """The outputs of a wrist with dry friction (N.m) in both input shafts, from rest, in steps between which motors move evenly."""
     assert motion.omega is not None
@@ -72,7 +72,7 @@ def main() -> None:
     parser.add_argument("--noise", type=int)
     parser.add_argument("--measure", default="tau1,tau2,theta3,theta4,pitch,roll")
     parser.add_argument("--friction", type=float, default=0.0, help="of each input shaft, N.m")
-    parser.add_argument("--fmu", type=Path, default=Path("target/fmu/prw_testbed.fmu"))
+    parser.add_argument("--fmu", type=Path, help="the testbed FMU (default: the FMU that prw finds)")
     options = parser.parse_args()
     rig, sensors = np.random.default_rng(options.seed), np.random.default_rng(options.noise)
     motion = read_motion(options.motion)

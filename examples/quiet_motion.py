@@ -9,7 +9,6 @@ assumed stiffness was wrong.
 
 import tempfile
 import zipfile
-from pathlib import Path
 
 import casadi
 import numpy as np
@@ -18,7 +17,7 @@ from scipy.linalg import expm
 
 import prw
 
-FMU = Path("target/fmu/prw_testbed.fmu")
+FMU = prw.default_fmu()
 MOVE, AFTER, STEP = 0.25, 0.35, 2.5e-3  # s
 GOAL = np.deg2rad([20, 30])  # pitch and roll, rad
 SIDES = np.array([[1, 4 / 7], [1, -4 / 7]]) @ GOAL  # the motors' angles there: eq. (1) solved, M = 4, N = 7

@@ -7,13 +7,12 @@ it.
     make examples; .venv/bin/python examples/tolerances.py
 """
 
-from pathlib import Path
-
 import fmu_run
 import numpy as np
 from matplotlib.figure import Figure
 
-FMU = Path("target/fmu/prw_testbed.fmu")
+import prw
+
 RUNS, STEP, MOVE, LENGTH = 10_000, 2e-3, 0.35, 0.7  # s
 GOAL = np.deg2rad([20, 30])  # pitch and roll, rad
 SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # motor angles per pitch and roll: inverse of eq. (1), M = 4, N = 7
@@ -37,7 +36,7 @@ def errors(runs: int = RUNS) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
     """Time (n,) s, the drawn parameters, and the errors of pitch and roll by name, (runs, n) in rad."""
     time, wrist, rates = motion()
     motors = dict(zip(("theta1", "theta2", "omega1", "omega2"), (*(wrist @ SIDES.T).T, *(rates @ SIDES.T).T)))
-    with fmu_run.Fmu(FMU) as fmu:
+    with fmu_run.Fmu(prw.default_fmu()) as fmu:
         drawn = draw({name: float(fmu.variables[name].start or 0) for name in TOLERANCES}, runs)
         found = fmu.run(time, inputs=motors, start={**drawn, "use_omega": True}, outputs=["pitch", "roll"]).check()
     return time, drawn, {name: found[name] - wrist[:, k] for k, name in enumerate(("pitch", "roll"))}

@@ -13,7 +13,8 @@ import fmu_run
 import numpy as np
 from matplotlib.figure import Figure
 
-FMU = "target/fmu/prw_testbed.fmu"
+import prw
+
 STEPS = (5e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3)  # s
 FINEST = 62.5e-6  # s
 MOVE = 0.6  # s
@@ -72,7 +73,7 @@ def simulate(h: float, extrapolated: bool, motion: Motion, end: float) -> tuple[
     """Couple drives and FMU in communication steps of h s. The torque is held over a step, or follows the line through its last
     two values. Returns the times (n,) s, and tau1, tau2, pitch and roll (n,) by name."""
     times, x, rows = h * np.arange(round(end / h) + 1), np.zeros((4, 2)), []
-    with fmu_run.Fmu(FMU) as fmu:
+    with fmu_run.Fmu(prw.default_fmu()) as fmu:
         wrist = fmu.instances(start={"use_omega": True})
         for time in times:
             wrist.set(("theta1", "theta2", "omega1", "omega2"), x[:2].reshape(1, 4))

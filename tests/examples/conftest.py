@@ -1,14 +1,16 @@
-"""Runs the tests in the project's directory, and checks that the FMUs of the examples are built."""
+"""Runs the tests in another directory, because the examples find their FMUs from any, and checks that these are built."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from built import ROOT, built
+from built import built
 
 
 @pytest.fixture(autouse=True)
-def in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Changes to the directory from which the examples find the FMUs, and exits if an FMU is missing."""
-    monkeypatch.chdir(ROOT)
+def elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Changes to an empty directory, and exits if an FMU is missing."""
+    monkeypatch.chdir(tmp_path)
     for name in ("prw_testbed.fmu", "prw_controller.fmu"):
         built(name)

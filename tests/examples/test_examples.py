@@ -39,6 +39,7 @@ def test_the_page_has_its_purpose_and_figures() -> None:
 
 
 def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
     for name, value in {"EXAMPLES": ("lqr",), "PAGE": tmp_path / "page.md", "FIGURES": tmp_path}.items():
         monkeypatch.setattr(examples, name, value)
     assert cli.run("tools", "", {"examples": examples}, ["examples"]) == 0

@@ -81,7 +81,8 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
     )
     envs = VectorEnv(loop, 3)
     assert envs.single_observation_space.low[2] == 0.0 and envs.single_observation_space.high[2] == 1e9
-    first, _ = envs.reset(seed=4)
+    first, begun = envs.reset(seed=4)
+    assert np.array_equal(begun["drawn"]["testbed.k1"], first[:, 1]) and begun["_drawn"].all()
     for _ in range(15):
         observed, _, _, _, infos = envs.step(np.full((3, 1), 0.2))
     assert (observed[:, 0] > 1e-4).all() and infos == {} and np.array_equal(observed[:, 1], first[:, 1])
@@ -112,6 +113,9 @@ def test_environments_equal_instances(task, mode) -> None:
         assert np.array_equal(observed, expected)
         for action in actions:
             observed, rewards, terminated, truncated, infos = envs.step(action)
+            renewed = k == task.length if mode is AutoresetMode.NEXT_STEP else k == task.length - 1
+            if mode is not AutoresetMode.DISABLED and renewed:
+                assert np.array_equal(infos["drawn"]["k1"], envs._instances.get("k1"))
             if k == task.length and mode is AutoresetMode.NEXT_STEP:
                 expected, k = begin_episode(), 0
                 assert not (rewards.any() or truncated.any())
@@ -245,7 +249,10 @@ def test_a_failure_ends_one_episode(task, mode, count) -> None:
     after, _, terminated, _, infos = envs.step(np.zeros((count, 2)))
     expected, *_ = other.step(np.zeros((count, 2)))
     assert np.isfinite(after).all() and np.array_equal(after[:-1], expected[:-1])
-    assert not terminated.any() and infos == {} and envs.steps[-1] == (0 if mode == "NextStep" else 1)
+    assert not terminated.any() and "error" not in infos and envs.steps[-1] == (0 if mode == "NextStep" else 1)
+    if mode == "NextStep":
+        k1 = np.where(last, envs._instances.get("k1"), 0.0)
+        assert np.array_equal(infos["_drawn"], last) and np.array_equal(infos["drawn"]["k1"], k1)
 
 
 @pytest.mark.parametrize(

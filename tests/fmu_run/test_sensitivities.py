@@ -33,6 +33,20 @@ def test_sensitivities_are_the_derivatives_of_the_exact_solution(testbed) -> Non
             assert error < 1e-8 * np.abs(exact).max() + 1e-11 * np.abs(at[output]).max() / table[name]
 
 
+def test_parameters_that_are_0(testbed) -> None:
+    """A parameter at the end of its range cannot be varied, and others need a step."""
+    few = {"parameters": ["c3"], "outputs": "roll", "fmu": testbed}
+    with pytest.raises(prw.UserError, match=r"parameters: c3 is 0, the least value .* as in values=\{'c3': 1e-3\}"):
+        prw.sensitivities(values={"c3": 0.0}, **few)
+    states = {"parameters": "theta5_start", "values": {"start_at_rest": False}, "outputs": "roll", "fmu": testbed}
+    with pytest.raises(prw.UserError, match=r"theta5_start is 0; give its largest step, as in steps="):
+        prw.sensitivities(**states)
+    # eq. (1): roll is N / 2M times the difference of theta5 and theta6.
+    assert prw.sensitivities(steps={"theta5_start": 0.1}, **states)["roll", "theta5_start"][0] == pytest.approx(7 / 8)
+    with pytest.raises(prw.UserError, match="steps: k1 is not known"):
+        prw.sensitivities(steps={"k1": 1.0}, **few)
+
+
 class Noisy(dict):
     """Results of runs of exp(k t), with errors of a solver of this relative size."""
 

@@ -191,8 +191,8 @@ def test_a_recording_that_begins_in_motion(testbed: Path, rates: bool, phase: fl
         return prw.Motion(time, np.transpose(angles), np.transpose(omega) if with_rates else None)
 
     with pytest.warns(UserWarning, match=r"begins in motion \(theta\d turns at .*leave out these results") as noted:
-        run = prw.simulate(motion(0.0, 1000, rates), fmu=testbed)
-    assert len(noted) == 1 and run.notes == [str(noted[0].message)] and run.beginning is not None
+        run = prw.simulate(motion(0.0, 1000, rates).columns, fmu=testbed)
+    assert len(noted) == 1 and run.notes[-1] == str(noted[0].message) and run.beginning is not None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         longer = prw.simulate(motion(-10.0, 4000, True), fmu=testbed)

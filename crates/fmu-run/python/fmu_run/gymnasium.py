@@ -111,6 +111,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     observation is repeated, and `infos["error"]` contains the message (with SAME_STEP, `infos["final_info"]["error"]`). All other
     instances continue.
 
+    When episodes begin, `infos["drawn"]` contains the start values and goals that were drawn, (num_envs,) by name.
+
     Parameters
     ----------
     task
@@ -210,7 +212,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             if which[index] and own is not None:
                 self.generators[index] = np.random.default_rng(own)
         self._begin(which, self._values)
-        return self._seen.copy(), {}
+        return self._seen.copy(), self._begun(which)
 
     def step(self, actions: ArrayLike) -> tuple[_Array, _Array, _Bools, _Bools, _Info]:
         """Perform a step of all instances.
@@ -224,7 +226,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         -------
         observations (num_envs, observations), rewards, terminated and truncated (num_envs,), and infos
         """
-        before, renew = self._values, self._over
+        before, renew = self._values, self._over.copy()
         if before is None or (self._mode is AutoresetMode.DISABLED and renew.any()):
             which = "all" if before is None else f"episodes {np.flatnonzero(renew).tolist()} are over"
             raise ResetNeeded(f"reset comes before step: {which}")
@@ -252,7 +254,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             errors = {index: why for index, why in errors.items() if not renew[index]}
             rewards[renew], terminated[renew], truncated[renew] = 0.0, False, False
             self._begin(renew, after)
-        infos: _Info = {}
+            infos = self._begun(renew)
+        else:
+            infos = {}
         for index, why in errors.items():
             self._add_info(infos, {"error": why}, index)
         self._values, self._over = after, terminated | truncated
@@ -262,6 +266,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
                 final[ended] = self._seen[ended].copy()
             infos = {"final_obs": final, "_final_obs": over, "final_info": infos, "_final_info": over.copy()}
             self._begin(over, after)
+            infos |= self._begun(over)
         return self._seen.copy(), rewards, terminated, truncated, infos
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -317,6 +322,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         self._late.begin(which, values[which, : self._seen.shape[1]])
         self._late_actions.begin(which, np.zeros(1))
         self._see(which, values)
+
+    def _begun(self, which: _Bools) -> _Info:
+        """The information about new episodes: the start values and goals that were drawn, by name."""
+        names = [*self.task.drawn, *self.task.goals]
+        if not names:
+            return {}
+        values = {name: np.where(which, column, 0.0) for name, column in zip(names, self._drawn.T)}
+        return {"drawn": {**values, **{f"_{name}": which.copy() for name in names}}, "_drawn": which.copy()}
 
     def _with_goals(self, read: _Array) -> _Array:
         """Insert the goals between the observations and the privileged variables."""
@@ -387,8 +400,9 @@ class Env(gymnasium.Env[_Array, _Array]):
         """Begin a new episode."""
         super().reset(seed=seed)
         self._one.generators = [self.np_random]
-        observation, _ = self._one.reset()
-        return observation[0], {}
+        observation, info = self._one.reset()
+        drawn = {name: values[0] for name, values in info.get("drawn", {}).items() if not name.startswith("_")}
+        return observation[0], {"drawn": drawn} if drawn else {}
 
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
         """Perform a step. If the FMU rejects it, or if an observation is not finite, `info["error"]` contains the message."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ def sensitivities(
     *,
     values: Given = None,
     outputs: str | Sequence[str] = OUTPUTS,
+    steps: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> fmu_run.Sensitivities:
     """Differentiate the response of the testbed with respect to its parameters.
@@ -40,6 +41,8 @@ def sensitivities(
         Values of parameters at which to differentiate, as `parameters` for `prw.simulate`.
     outputs
         Names of any Real variables.
+    steps
+        The largest step of a parameter by name, as for `fmu_run.Fmu.sensitivities`. A parameter that is 0 needs one.
     fmu
         As for `prw.simulate`.
 
@@ -52,7 +55,7 @@ def sensitivities(
     Raises
     ------
     UserError
-        A name is unknown, a parameter is 0, or the FMU rejects a value.
+        A name is unknown, a parameter is at the end of its range or is 0 and has no step, or the FMU rejects a value.
     """
     moved, names = motion_of(motion), names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
@@ -66,7 +69,16 @@ def sensitivities(
         )
         check_names("parameters", chosen, testbed.starts)
         check_names("outputs", names, testbed.loaded.variables)
+        check_names("steps", steps, chosen)
+        for name in chosen:
+            if float(starts[name]) == testbed.loaded.variables[name].min:
+                raise UserError(
+                    f"{name} is {starts[name]:g}, the least value that it can have, so it cannot be varied in both directions; choose a "
+                    f"larger one, as in values={{{name!r}: 1e-3}}",
+                    argument="parameters",
+                )
+        about: dict[str, Any] = {"outputs": names, "parameters": chosen, "steps": steps}
         try:
-            return testbed.loaded.sensitivities(moved.time, outputs=names, parameters=chosen, **driven_by(moved, given))
+            return testbed.loaded.sensitivities(moved.time, **about, **driven_by(moved, given))
         except ValueError as error:
             raise UserError(str(error)) from None

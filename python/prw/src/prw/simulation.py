@@ -185,7 +185,7 @@ def simulate(
     Warns
     -----
     UserWarning
-        The motors turn at the first sample already, or are sampled so coarsely that an output may be off by more than 1 % of its peak.
+        The motors of a recording, or of a Motion without rates, turn at the first sample already, or are sampled so coarsely that an output may be off by more than 1 % of its peak.
     """
     moved = motion_of(motion)
     names = names_of("outputs", outputs)
@@ -199,7 +199,9 @@ def simulate(
         if len(moved.time[::2]) >= MIN_TIMES:
             coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
             other = testbed.respond(coarse, names, given)
-            begins = beginning(moved, found, lambda longer: testbed.respond(longer, names, given))
+            # The rates of a Motion say how the motors begin.
+            if moved.omega is None or not isinstance(motion, Motion):
+                begins = beginning(moved, found, lambda longer: testbed.respond(longer, names, given))
     settled = moved.time[0] + (0.0 if begins is None else begins.lasts)
     # If all samples are at the beginning, the other warning covers the error.
     late = slice(int(np.searchsorted(moved.time[::2], settled)), None)
