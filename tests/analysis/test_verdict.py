@@ -69,7 +69,16 @@ def real_rigs():
     return dict(zip(REAL_RIGS, plant.experiments(cases, 6.0)))
 
 
-@pytest.mark.parametrize("fault", FAULTY_RIGS, ids=lambda fault: f"{fault[0]} {fault[1]:g}")
+def quickly(cases, *quick):
+    """The cases as parameters of tests, of which `make test` runs the quick ones."""
+    return [pytest.param(case, marks=[] if case in quick else pytest.mark.long, id=named(case)) for case in cases]
+
+
+def named(case) -> str:
+    return case if isinstance(case, str) else f"{case[0]} {case[1]:g}"
+
+
+@pytest.mark.parametrize("fault", quickly(FAULTY_RIGS, ("late", 1.0), ("gain", 2.0)))
 def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     channels, reported = FAULTY_RIGS[fault]
     found = prw.identify(recording(with_fault(experiment, *fault)), starts=1, fmu=fmu)
@@ -78,7 +87,7 @@ def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     assert any(reported in cause for cause in found.diagnosis), found.diagnosis
 
 
-@pytest.mark.parametrize("fault", FAULTY_COLUMNS)
+@pytest.mark.parametrize("fault", quickly(FAULTY_COLUMNS, "clipped", "degrees", "sign", "swapped", "stuck"))
 def test_a_faulty_column_is_named(experiment, fmu, fault):
     change, channel, reported = FAULTY_COLUMNS[fault]
     columns = recording(experiment)
@@ -87,6 +96,7 @@ def test_a_faulty_column_is_named(experiment, fmu, fault):
     assert reported in found.diagnosis[0], found.diagnosis
 
 
+@pytest.mark.long
 def test_two_faults_are_both_named(experiment, fmu):
     """Friction causes the larger part of the misfit, and torques that are 1 ms late the rest."""
     simulated = rig.nonlinear(experiment, friction=0.15)
@@ -110,7 +120,9 @@ def assert_contains(found, simulated) -> None:
         assert abs(estimate.value - simulated.parameters[name]) < 4.5 * estimate.standard_error, name
 
 
-@pytest.mark.parametrize("name", [name for name, (_, added, _) in REAL_RIGS.items() if added])
+@pytest.mark.parametrize(
+    "name", quickly([name for name, (_, added, _) in REAL_RIGS.items() if added], "friction", "backlash of k2")
+)
 def test_what_the_rig_adds_is_estimated(real_rigs, fmu, name):
     _, added, size = REAL_RIGS[name]
     found = prw.identify(recording(real_rigs[name]), starts=1, fmu=fmu)
@@ -128,6 +140,7 @@ def test_friction_is_estimated_on_request(real_rigs, fmu):
     assert abs(value - 0.001) < 4.5 * error < 0.002
 
 
+@pytest.mark.long
 def test_wrong_inertias_are_named_beside_a_gain_of_the_torques(real_rigs, fmu):
     columns = recording(real_rigs["inertia"])
     found = prw.identify(columns, starts=1, fmu=fmu)
@@ -201,7 +214,7 @@ def test_a_common_fault_is_found_if_parameters_compensate_for_each_single_one(fm
     assert '(to estimate it, add `delay=["tau1", "tau2"]`)' in found.diagnosis[0], found.diagnosis
 
 
-@pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4", "moves"])
+@pytest.mark.parametrize("pattern", quickly(["independent", "equal", "slow", "fig4", "moves"], "equal", "moves"))
 def test_a_rig_without_faults_fits(fmu, pattern):
     found = prw.identify(recording(rig.experiment(30, 6, pattern=pattern)), starts=1, fmu=fmu)
     assert found.fits and not found.misfits and not found.diagnosis
@@ -222,8 +235,8 @@ def test_coarse_encoders_on_the_motors_are_not_a_fault(fmu):
     "fault, option, channels, size",
     [
         (("late", 1.0), "delay", ("tau1", "tau2"), 1e-3),
-        (("lag", 2.0), "lag", rig.ALL, 2e-3),
-        (("gain", 2.0), "gain", ("tau1",), 1.02),
+        pytest.param(("lag", 2.0), "lag", rig.ALL, 2e-3, marks=pytest.mark.long),
+        pytest.param(("gain", 2.0), "gain", ("tau1",), 1.02, marks=pytest.mark.long),
     ],
 )
 def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, size):
@@ -236,7 +249,9 @@ def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, si
         assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
 
 
-@pytest.mark.parametrize("name", ["nothing", "hardly any friction", "undetectable friction"])
+@pytest.mark.parametrize(
+    "name", quickly(["nothing", "hardly any friction", "undetectable friction"], "undetectable friction")
+)
 def test_intervals_allow_for_friction_that_is_too_small_to_be_found(real_rigs, fmu, name):
     found = prw.identify(recording(real_rigs[name]), starts=1, fmu=fmu)
     assert found.fits and not found.additions, found.misfits
@@ -263,8 +278,8 @@ def test_an_equal_gain_of_the_torques_is_found_if_inertias_are_known(experiment,
             assert abs(estimate.value - factor * experiment.parameters[name]) < 4.5 * estimate.standard_error, name
 
 
-def test_the_command_reports_and_writes_no_parameters(prw, tmp_path, experiment):
-    rig.write(tmp_path / "run.csv", rig.measure(rig.late(experiment, 1e-3), 5))
+def test_the_command_reports_and_writes_no_parameters(prw, tmp_path):
+    rig.write(tmp_path / "run.csv", rig.measure(rig.late(rig.experiment(1, 3), 1e-3), 5))
     out = tmp_path / "out" / "identified"
     result = prw("identify", "run.csv", "--starts", 1)
     reported = [line for line in result.stderr.splitlines() if not line.startswith("looking for ")]  # progress
