@@ -43,6 +43,26 @@ pub(crate) unsafe fn out_slice<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
+/// Fails if the importer's array of values overlaps another one, because the values would be written over references or seeds that
+/// are still needed. Each array is its address, its length and its name for the message.
+#[inline]
+pub(crate) fn apart<T, U>(
+    (pointer, length, name): (*const T, usize, &str),
+    (values, count, argument): (*const U, usize, &str),
+) -> Outcome {
+    // An array does not begin inside of the other one if the distance is at least the size.
+    let [begin, other] = [pointer.addr(), values.addr()];
+    let [size, written] = [length.saturating_mul(size_of::<T>()), count.saturating_mul(size_of::<U>())];
+    if other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
+        return Ok(());
+    }
+    // Arrays that are larger than memory have another error.
+    if size == 0 || written == 0 || size.max(written) > isize::MAX as usize {
+        return Ok(());
+    }
+    reject(format!("the arrays {name} and {argument} overlap"))
+}
+
 /// Checks that an array of `count` elements has the `needed` length; `what` describes the elements in the message.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {

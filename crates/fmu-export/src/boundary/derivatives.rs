@@ -1,6 +1,6 @@
 //! Partial and time derivatives, which are written to arrays of the importer.
 
-use super::{in_slice, out_slice, reserve, same};
+use super::{apart, in_slice, out_slice, reserve, same};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
@@ -9,7 +9,7 @@ use std::mem::MaybeUninit;
 /// FMI 3.0). The last four arguments are arrays with their lengths; `names` contains their names for messages.
 ///
 /// # Safety
-/// Each array is NULL or has the given length; the result does not overlap the others.
+/// Each array is NULL or has the given length.
 #[inline]
 pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOINT: bool>(
     instance: &mut Instance<M>,
@@ -21,12 +21,11 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
 ) -> Outcome {
     let (seed_count, result_count) = (seed.1, result.1);
     // SAFETY: the caller guarantees the arrays and their lengths.
-    let (unknown, known, seed, result) = unsafe {
+    let (unknown, known, seed) = unsafe {
         (
             in_slice(R::cast(unknown.0), unknown.1, names[0])?,
             in_slice(R::cast(known.0), known.1, names[1])?,
             in_slice(seed.0, seed.1, names[2])?,
-            out_slice(result.0, result.1, names[3])?,
         )
     };
     let counts =
@@ -34,6 +33,12 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     let [wanted, seeded] = if ADJOINT { [counts[1], counts[0]] } else { counts };
     same(seeded.0, seeded.1, seed_count)?;
     same(wanted.0, wanted.1, result_count)?;
+    let written = (result.0.cast_const(), result_count, names[3]);
+    apart((unknown.as_ptr(), unknown.len(), names[0]), written)?;
+    apart((known.as_ptr(), known.len(), names[1]), written)?;
+    apart((seed.as_ptr(), seed_count, names[2]), written)?;
+    // SAFETY: the caller guarantees the array and its length, and it does not overlap the others.
+    let result = unsafe { out_slice(result.0, result_count, names[3]) }?;
     // More references than variables may be a wrong length, so they are checked before the first write. Checking them always would
     // take a seventh of the instructions of a call.
     let wanted = if ADJOINT { known } else { unknown };
@@ -63,7 +68,7 @@ fn elements<M: Exported, R: Reference>(vr: &[R], count: usize) -> Outcome<Vec<u3
 /// references and of orders.
 ///
 /// # Safety
-/// Each array is NULL or has the given length; the values do not overlap the others.
+/// Each array is NULL or has the given length.
 pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: *const u32,
@@ -73,14 +78,14 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     value_count: usize,
 ) -> Outcome {
     // SAFETY: the caller guarantees the arrays and their lengths.
-    let (vr, order, value) = unsafe {
-        (
-            in_slice(R::cast(vr), count, R::REFERENCES)?,
-            in_slice(order, count, order_name)?,
-            out_slice(value, value_count, R::VALUES)?,
-        )
-    };
+    let (vr, order) =
+        unsafe { (in_slice(R::cast(vr), count, R::REFERENCES)?, in_slice(order, count, order_name)?) };
     same("values", instance.count_elements(vr)?, value_count)?;
+    let written = (value.cast_const(), value_count, R::VALUES);
+    apart((vr.as_ptr(), count, R::REFERENCES), written)?;
+    apart((order.as_ptr(), count, order_name), written)?;
+    // SAFETY: the caller guarantees the array and its length, and it does not overlap the others.
+    let value = unsafe { out_slice(value, value_count, R::VALUES) }?;
     if M::ARRAYS && R::ARRAYS {
         // One order applies to the whole array (section 4.1.2 of FMI 3.0).
         let elements = elements::<M, R>(vr, value_count)?;

@@ -15,7 +15,7 @@ pub(crate) mod states;
 pub(crate) mod values;
 pub(crate) mod webassembly;
 
-pub(crate) use arrays::{in_slice, of_elements, out_slice, out_value, reserve, same, string};
+pub(crate) use arrays::{apart, in_slice, of_elements, out_slice, out_value, reserve, same, string};
 pub(crate) use call::{Component, call, call_fast, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use gate::Gate;

@@ -37,17 +37,22 @@ macro_rules! getters_and_setters {
             values: *mut $type
             $(, $value_count: usize)?
         ) -> Outcome {
-            use crate::boundary::{in_slice, of_elements, out_slice, same};
+            use crate::boundary::{apart, in_slice, of_elements, out_slice, same};
             use crate::instance::Reference;
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths, which do not overlap.
+            let are_apart =
+                || apart((vr, count, <$reference>::REFERENCES), (values, value_count, <$reference>::VALUES));
+            // SAFETY: by contract, the pointers are NULL or point to arrays of these lengths. `apart` has
+            // compared them.
             unsafe {
                 if M::ARRAYS && <$reference>::ARRAYS {
                     return of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
+                        are_apart()?;
                         $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
                     });
                 }
                 same("values", count, value_count)?;
+                are_apart()?;
                 let vr: &[$reference] = in_slice(<$reference>::cast(vr), count, <$reference>::REFERENCES)?;
                 $get_values(instance, vr, out_slice(values, value_count, <$reference>::VALUES)?, &$bases)
             }

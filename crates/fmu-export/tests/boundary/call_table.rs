@@ -415,7 +415,8 @@ fn needs_no_pointer(function: &str, name: &str) -> bool {
         || function.contains("FreeFMU") && name == "state"
 }
 
-/// Checks the pointers of every function: NULL, misaligned addresses, and arrays with a length that is larger than memory.
+/// Checks the pointers of every function: NULL, misaligned addresses, arrays that overlap, and arrays with a length that is larger than
+/// memory.
 /// The call must be rejected with the reason and must not change anything.
 fn pointers<F: Either, M: Exported>() {
     let mut checked = 0;
@@ -451,6 +452,11 @@ fn pointers<F: Either, M: Exported>() {
                     let message = fmu.rejected(&label, |fmu| call.make(fmu, |words| words[index] += 1));
                     assert!(message.contains("not aligned"), "{label}: {message}");
                 }
+            }
+            if !function.ends_with("Binary") && call.overlap() {
+                let message = fmu.rejected(function, |fmu| call.make(fmu, |_| ()));
+                assert!(message.contains(" overlap"), "{function}: {message}");
+                call = ValidCall::new::<F, M>(&fmu, function, mode);
             }
             let is_array = call.arguments.first().is_some_and(|first| first.name == "vr")
                 && !function.ends_with("Binary");

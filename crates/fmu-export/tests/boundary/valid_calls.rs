@@ -115,6 +115,24 @@ impl ValidCall {
         unsafe { fmu.call(self.function, &words) }
     }
 
+    /// Lets the array to which the call writes begin in the middle of the one of its references, of which there are three, because the
+    /// fast paths take one, two or four. Returns whether the call has both.
+    pub fn overlap(&mut self) -> bool {
+        let written = self.arguments.iter().rposition(|of| of.pointee().is_some_and(|(_, read)| !read));
+        let first = self.arguments.first().and_then(Argument::pointee);
+        let (Some(written), Some(("ValueReference", true))) = (written, first) else {
+            return false;
+        };
+        let reference = self.memory[0].as_mut_ptr().cast::<u32>();
+        // SAFETY: the memory of an argument has at least 16 words, and `new` has written the first reference.
+        unsafe { (1..3).for_each(|index| reference.add(index).write(*reference)) };
+        self.words[written] = self.words[0] + 8;
+        for (word, argument) in self.words.iter_mut().zip(self.arguments) {
+            *word = if argument.of == "usize" { 3 } else { *word };
+        }
+        true
+    }
+
     /// Reads all values that a successful call must have written, so that Miri and valgrind detect uninitialized ones.
     /// Returns the number of values.
     pub fn read_outputs(&self) -> usize {
