@@ -15,7 +15,11 @@ TIME = np.arange(11) / 10
 BEHAVIOURS = {
     "good": (11, None, None),
     "silent error": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
-    "pending": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),
+    "pending": (
+        6,
+        "at 0.5 s: fmi2GetStatus, after fmi2DoStep had returned Pending, returned Error without a message",
+        None,
+    ),
     "fatal": (6, "at 0.5 s: fmi2DoStep returned Fatal without a message", None),
     "discard": (6, "at 0.5 s: fmi2DoStep: no more of this after half", None),
     "no status": (6, "at 0.5 s: fmi2DoStep returned Error without a message", None),

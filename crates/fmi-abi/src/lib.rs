@@ -37,7 +37,7 @@ pub use mode::{AllowedStates, FmiState, Mode};
 pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
-pub use text::{SHOWN, is_c_identifier, is_plain_file_name, one_line, shown, shown_to};
+pub use text::{SHOWN, is_c_identifier, is_plain_file_name, one_line, shown, shown_number, shown_to};
 pub use value::{Value, boolean};
 
 /// Defines the items of an FMI version's module from its list of functions.

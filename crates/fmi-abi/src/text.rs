@@ -38,6 +38,11 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     Cow::Owned(escaped)
 }
 
+/// Returns a number for a message, with an exponent if it would need many zeros, as a very short time would.
+pub fn shown_number(number: f64) -> impl std::fmt::Display {
+    crate::Value::Real(number)
+}
+
 /// Returns whether a terminal or an editor would interpret the character instead of showing it. These are control
 /// characters, line and paragraph separators, and marks that change the direction of text.
 fn is_unsafe(letter: char) -> bool {

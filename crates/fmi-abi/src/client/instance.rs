@@ -9,7 +9,7 @@ use crate::c_types::{c_int, c_void};
 use crate::calls::{Functions, Instantiation, Library, callbacks, log_callback};
 use crate::fmi2::types::*;
 use crate::fmi3::types::*;
-use crate::{Interface, Standard, Status};
+use crate::{Interface, Standard, Status, shown_number};
 use std::ffi::{CStr, CString};
 use std::fmt;
 use std::ptr::null;
@@ -411,7 +411,7 @@ impl Instance {
             match self.library.functions() {
                 Functions::Fmi2(of) => {
                     let code = (of.fmi2DoStep)(handle, time, size, no_return.into());
-                    ("fmi2DoStep", if code == PENDING { wait(of, handle) } else { code })
+                    if code == PENDING { wait(of, handle) } else { ("fmi2DoStep", code) }
                 }
                 Functions::Fmi3(of) => {
                     let step = of.fmi3DoStep;
@@ -468,7 +468,7 @@ impl Instance {
         let (function, status) = ("fmi3DoStep", Status::Discard);
         let mut log = self.log.take();
         if !wanted {
-            let text = format!("the step ended early, at {reached} s");
+            let text = format!("the step ended early, at {} s", shown_number(reached));
             log.push(Message { status, category: String::new(), text });
         }
         let rejection = self.rejection(function, status, log);
@@ -632,10 +632,10 @@ impl Instance {
     }
 }
 
-/// Waits for the end of an asynchronous step and returns its status. Asks for the status repeatedly, because this crate
-/// passes no `stepFinished` callback (section 4.2.2 of FMI 2.0).
+/// Waits for the end of an asynchronous step. Returns the function that failed, if one has, and the status of the step. Asks for the
+/// status repeatedly, because this crate passes no `stepFinished` callback (section 4.2.2 of FMI 2.0).
 #[cold]
-fn wait(functions: &crate::fmi2::Functions, handle: *mut c_void) -> c_int {
+fn wait(functions: &crate::fmi2::Functions, handle: *mut c_void) -> (&'static str, c_int) {
     const LONGEST_PAUSE: Duration = Duration::from_millis(1);
     let mut pause = Duration::from_micros(10);
     loop {
@@ -643,11 +643,11 @@ fn wait(functions: &crate::fmi2::Functions, handle: *mut c_void) -> c_int {
         let kind = StatusKind::DoStepStatus as fmi2StatusKind;
         // SAFETY: the instance is alive; the pointer is a live reference.
         let code = unsafe { (functions.fmi2GetStatus)(handle, kind, &mut status) };
-        if code != Status::Ok as c_int {
-            return Status::Error as c_int;
+        if code != Status::Ok as c_int && code != Status::Warning as c_int {
+            return ("fmi2GetStatus, after fmi2DoStep had returned Pending,", code);
         }
         if status != PENDING {
-            return status;
+            return ("fmi2DoStep", status);
         }
         std::thread::sleep(pause);
         pause = (2 * pause).min(LONGEST_PAUSE);

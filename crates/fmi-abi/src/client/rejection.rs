@@ -1,6 +1,6 @@
 //! Errors of an instance, with the messages of its FMU.
 
-use crate::{Status, shown_to};
+use crate::{Status, shown_number, shown_to};
 
 /// Maximum number of characters of an FMU's message in an error.
 const LONGEST: usize = 500;
@@ -84,7 +84,7 @@ impl std::fmt::Display for Rejection {
             write!(f, "{label}: ")?;
         }
         if let Some(time) = ended {
-            write!(f, "ended by the FMU at t = {time} s")?;
+            write!(f, "ended by the FMU at t = {} s", shown_number(*time))?;
             return message.map_or(Ok(()), |message| write!(f, ": {message}"));
         }
         match message {
