@@ -17,7 +17,12 @@
     M(relay)     /* x' = -1 if x > 0, else 1: after 1 s the sign of x changes again and again. */ \
     M(announce)  /* From t = 0.5 on, each event announces another one at the same time. */ \
     M(swap)      /* x' = x, from x = 1. After the first step with |x| > 2 it requests an event, at which x becomes -x and y = -x. */ \
-    M(stale)     /* x' = -x; y is calculated only when the derivatives are read. */ \
+    M(stale)     /* x' = -x; y is calculated only when the derivatives are read: OpenModelica 1.12. */ \
+    M(flagged)   /* x' = -x; y is calculated when it is read after the states have been set, unless the derivatives have been read
+                    since: OpenModelica 1.21. */ \
+    M(wave)      /* hits = number of changes of the sign of cos(10 pi t). It has no states. */ \
+    M(pair)      /* x' = 1. At t = 0.5 there are two events: the first one announces the second one for the same time. */ \
+    M(nowhere)   /* x' = 1. The event at t = 0.5 announces one at NaN. */ \
     M(steady)    /* x' = -p x; requests an event after each step, at which nothing changes. */ \
     M(turn)      /* x' = 1. After the first step with x > 1.5 it requests an event, from which on x' = -1. */ \
     M(picky)     /* x' = -x; rejects the nominal values without a message if p = 2. */ \
@@ -36,7 +41,7 @@ struct Model {
     Fmu fmu;
     double x[2], u, w, p, y;
     int32_t n, hits;
-    int above, sign, wants, updates;
+    int above, sign, wants, updates, due;
     int model;
 };
 
@@ -44,7 +49,8 @@ static void set_start(Model *m) {
     int model = 0;
     while (model < COUNT && !is(NAMES[model])) model++;
     m->model = model;
-    m->sign = 1;
+    m->sign = m->due = 1;
+    m->above = model == wave_;
     m->p = model == ball_ || model == zeno_ ? 0.7 : model == stair_ ? 10 : model == pendulum_ ? 9 : 1;
     m->x[0] = model == lag_ ? 0 : model == vanderpol_ ? 2 : model == pendulum_ ? 0.5 : 1;
 }
@@ -64,12 +70,17 @@ static size_t count(const Model *m, bool indicators) {
     case ball_: case zeno_: return indicators ? 1 : 2;
     case vanderpol_: case pendulum_: return indicators ? 0 : 2;
     case stair_: return 0;
+    case wave_: return indicators;
     case relay_: case ending_: case zero_: return 1;
     default: return indicators ? 0 : 1;
     }
 }
 
-static void indicators(Model *m, double *to) { *to = m->model == zero_ ? 0 : m->model == ending_ ? m->x[0] - 0.5 : m->x[0]; }
+static double wave(const Model *m) { return cos(10 * acos(-1) * m->fmu.time); }
+
+static void indicators(Model *m, double *to) {
+    *to = m->model == zero_ ? 0 : m->model == ending_ ? m->x[0] - 0.5 : m->model == wave_ ? wave(m) : m->x[0];
+}
 
 static int derivatives(Model *m, double *d) {
     const double *x = m->x;
@@ -88,6 +99,8 @@ static int derivatives(Model *m, double *d) {
     case swap_: d[0] = x[0]; break;
     case turn_: d[0] = m->sign; break;
     case stale_: d[0] = -x[0]; m->y = x[0]; break;
+    case flagged_: d[0] = -x[0]; m->due = 0; break;
+    case pair_: case nowhere_: d[0] = 1; break;
     case failing_:
         if (m->fmu.time >= 0.5) return failed(m, ERROR, "the valve is stuck");
         d[0] = 1;
@@ -111,6 +124,13 @@ static int update_model(Model *m, Update *to) {
         break;
     case endless_: to->again = time >= 0.5; to->is_next = time < 0.5; to->next = 0.5; break;
     case announce_: to->is_next = true; to->next = time < 0.5 ? 0.5 : time; break;
+    case wave_: m->hits += m->above != (wave(m) > 0); break;
+    case pair_:
+        if (time >= 0.5 && m->hits < 2) m->hits++;
+        to->is_next = m->hits < 2;
+        to->next = 0.5;
+        break;
+    case nowhere_: to->is_next = true; to->next = time < 0.5 ? 0.5 : NAN; break;
     case swap_: if (m->wants) { m->x[0] *= -1; m->sign *= -1; m->hits++; to->states = to->nominals = true; } break;
     case steady_: m->hits += m->wants; break;
     case turn_: if (m->wants) { m->sign = -1; m->hits++; } break;
@@ -119,7 +139,7 @@ static int update_model(Model *m, Update *to) {
     default: break;
     }
     m->wants = 0;
-    m->above = m->model == relay_ && m->x[0] > 0;
+    m->above = m->model == wave_ ? wave(m) > 0 : m->model == relay_ && m->x[0] > 0;
     return OK;
 }
 
@@ -147,12 +167,19 @@ static bool place(Model *m, Kind kind, uint32_t vr, Place *to) {
     case P: return at_real(to, &m->p, m->model == pendulum_ ? FIXED : START);
     case Y:
         if (m->model == pendulum_) return calculated(&m->fmu, to, 1 - cos(m->x[0]));
-        return calculated(&m->fmu, to, m->model == stale_ ? m->y : (m->model == swap_ ? m->sign : 1) * m->x[0]);
+        if (m->model == flagged_ && m->due) { m->y = m->x[0]; m->due = 0; }
+        return calculated(&m->fmu, to, m->model == stale_ || m->model == flagged_ ? m->y : (m->model == swap_ ? m->sign : 1) * m->x[0]);
     case HITS: return at(to, INTEGER, &m->hits, 0);
     case X0: case X1: return at_real(to, &m->x[vr - X0], FIXED);
     case D0: case D1: return derivatives(m, d) == OK && calculated(&m->fmu, to, d[vr - D0]);
     default: return false;
     }
+}
+
+static bool take(Model *m, uint32_t vr, const void *value) {
+    (void)value;
+    m->due |= vr == UINT32_MAX;
+    return true;
 }
 
 static int enters(Model *m, int mode) {
@@ -171,6 +198,6 @@ static double partial(const Model *m, uint32_t unknown, uint32_t known) {
 
 const Behaviour behaviour = {
     .size = sizeof(Model), .saved = sizeof(Model), .state = offsetof(Model, x), .begin = begin, .start = set_start, .place = place,
-    .enter = enters, .update = update_model, .completed = completed, .count = count, .derivatives = derivatives,
+    .take = take, .enter = enters, .update = update_model, .completed = completed, .count = count, .derivatives = derivatives,
     .indicators = indicators, .nominals = nominals, .partial = partial,
 };

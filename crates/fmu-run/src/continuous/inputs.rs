@@ -86,18 +86,25 @@ impl<'a> Signal<'a> {
         Self { curve, next: 0, piece: Piece::default(), until: f64::INFINITY }
     }
 
-    /// Selects the polynomial for the times from this time to the next break.
-    fn enter(&mut self, time: f64) {
+    /// Selects the polynomial for the times from this time to the next break. Returns whether the value jumps here, because two
+    /// different values are given for one time.
+    fn enter(&mut self, time: f64) -> bool {
         let (times, values, slopes, is_held) = match self.curve {
-            Curve::Constant(value) => return self.piece = Piece::constant(value),
-            Curve::RateOf(_) => return,
+            Curve::Constant(value) => {
+                self.piece = Piece::constant(value);
+                return false;
+            }
+            Curve::RateOf(_) => return false,
             Curve::Samples { times, values, slopes, is_held } => (times, values, slopes, is_held),
         };
-        self.next += times[self.next..].iter().take_while(|other| **other <= time).count();
+        let first = self.next;
+        self.next += times[first..].iter().take_while(|other| **other <= time).count();
         let Some(left) = self.next.checked_sub(1) else {
             (self.piece, self.until) = (Piece::constant(values[0]), times[0]);
-            return;
+            return false;
         };
+        let jumps = (first.max(1)..self.next)
+            .any(|row| times[row] == times[row - 1] && differ(values[row - 1], values[row]));
         let value = values[left];
         if self.next == times.len() || is_held {
             self.piece = Piece::constant(value);
@@ -117,6 +124,7 @@ impl<'a> Signal<'a> {
             }
         }
         self.until = times.get(after).copied().unwrap_or(f64::INFINITY);
+        jumps
     }
 }
 
@@ -141,13 +149,13 @@ pub(super) enum Break {
     Jump,
 }
 
-/// Largest relative change of a continuous input at a break that is not treated as a jump, because rounding causes such changes
+/// Largest relative change of the rate of an input at a break that is not treated as a jump, because rounding causes such changes
 /// where two polynomials meet.
 const SAME: f64 = 1e-9;
 
-/// Returns whether the relative difference of two values exceeds this limit.
-fn differ(one: f64, other: f64, limit: f64) -> bool {
-    (other - one).abs() > limit * one.abs().max(other.abs())
+/// Returns whether two values differ; NaN equals NaN.
+fn differ(one: f64, other: f64) -> bool {
+    one != other && !(one.is_nan() && other.is_nan())
 }
 
 impl<'a> Signals<'a> {
@@ -163,7 +171,7 @@ impl<'a> Signals<'a> {
 
     /// Selects the polynomials for the start time, s.
     pub(super) fn begin(&mut self, time: f64) {
-        self.all.iter_mut().for_each(|signal| signal.enter(time));
+        self.all.iter_mut().for_each(|signal| _ = signal.enter(time));
         self.find_moving();
     }
 
@@ -175,24 +183,30 @@ impl<'a> Signals<'a> {
         }
         let mut found = Break::None;
         let before: Vec<_> = (0..self.all.len()).map(|index| self.value(index, time)).collect();
+        let mut jumps = false;
         for (index, signal) in self.all.iter_mut().enumerate() {
             if signal.until <= time {
                 let last = signal.piece;
-                signal.enter(time);
-                if is_end && index < self.moving && !differ(before[index], signal.piece.value(time), SAME) {
+                let is_jump = signal.enter(time);
+                if is_end && index < self.moving && !is_jump {
                     (signal.piece, signal.until) = (last, f64::INFINITY);
                 } else {
                     found = Break::Kink;
                 }
+                jumps |= is_jump;
             }
         }
-        for (index, before) in before.into_iter().enumerate() {
-            if differ(before, self.value(index, time), if index < self.moving { SAME } else { 0.0 }) {
-                found = Break::Jump;
+        jumps |= before.into_iter().enumerate().any(|(index, before)| {
+            let now = self.value(index, time);
+            match self.all[index].curve {
+                // Where two polynomials meet, the rounding error of the value may be large compared with the value.
+                Curve::Constant(_) | Curve::Samples { is_held: false, .. } => false,
+                Curve::Samples { is_held: true, .. } => differ(before, now),
+                Curve::RateOf(_) => (now - before).abs() > SAME * now.abs().max(before.abs()),
             }
-        }
+        });
         self.find_moving();
-        found
+        if jumps { Break::Jump } else { found }
     }
 
     /// Updates `is_moving`.
@@ -291,5 +305,20 @@ mod tests {
         let mut inputs = Signals::new([lines(&times, &values), Curve::RateOf(0)].into_iter(), 2);
         inputs.begin(0.0);
         assert_eq!(inputs.pass(1.0, false), Break::Jump);
+        // Two values for one time are a jump of any size, also at the end. The rounding error of a line is not one.
+        let after = |values: [f64; 4], is_end| {
+            let mut inputs = Signals::new([lines(&[0.0, 1.0, 1.0, 2.0], &values)].into_iter(), 1);
+            inputs.begin(0.0);
+            let mut row = Vec::new();
+            (inputs.pass(1.0, is_end), inputs.moving(1.0, &mut row), row[0])
+        };
+        for is_end in [false, true] {
+            let (found, (), value) = after([1.7e9, 1.7e9, 1.7e9 + 1.0, 1.7e9 + 1.0], is_end);
+            assert_eq!((found, value), (Break::Jump, 1.7e9 + 1.0));
+        }
+        assert_eq!(after([0.0, 1.0, 1.0, 5.0], false).0, Break::Kink);
+        let mut inputs = Signals::new([lines(&[0.0, 0.3, 2.0], &[1e9, 0.1, 1.0])].into_iter(), 1);
+        inputs.begin(0.0);
+        assert_eq!(inputs.pass(0.3, false), Break::Kink);
     }
 }

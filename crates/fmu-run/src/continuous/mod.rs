@@ -16,6 +16,7 @@ pub(crate) use model::Model;
 pub(crate) use simulation::{Hooks, Simulation};
 
 use crate::error::{Error, named, request};
+use fmi_abi::shown_number;
 use std::str::FromStr;
 
 /// Method for integrating an FMU in Model Exchange.
@@ -74,12 +75,12 @@ impl Integration {
     pub(crate) fn check(&self) -> Result<(), Error> {
         for (name, value) in [("rtol", self.rtol), ("atol", self.atol), ("max_step", self.max_step)] {
             if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                return request(format!("{name} is {value}; it must be above 0 and finite"));
+                return request(format!("{name} is {}; it must be above 0 and finite", shown_number(value)));
             }
         }
         match self.rtol {
             Some(rtol) if !(1e-13..1.0).contains(&rtol) => {
-                request(format!("rtol is {rtol}; it must be at least 1e-13 and below 1"))
+                request(format!("rtol is {}; it must be at least 1e-13 and below 1", shown_number(rtol)))
             }
             _ => Ok(()),
         }

@@ -5,7 +5,7 @@ use crate::description::Description;
 use crate::selection::Selection;
 use crate::system_instance::SystemInstance;
 use fmi_abi::client::{Continuous, Rejection};
-use fmi_abi::{Interface, Status};
+use fmi_abi::{Interface, Status, shown_number};
 use ivp::ivp::FirstOrderSystem;
 use ivp::matrix::Matrix;
 use std::cell::{RefCell, RefMut};
@@ -35,9 +35,11 @@ pub(crate) struct Parts<'a> {
     /// Time that was last set in the FMU, s; `None` if time, inputs and states must be set again.
     at: Option<f64>,
     x: Vec<f64>,
-    /// Buffers for inputs and derivatives.
+    /// Buffer for inputs.
     row: Vec<f64>,
+    /// The derivatives that were read last, and whether they are those at `at` and `x`.
     values: Vec<f64>,
+    are_known: bool,
     /// Number of failed evaluations since the last step.
     misses: usize,
     /// Reason for the last failed evaluation, except evaluations with states beyond [`TOO_FAR`].
@@ -66,6 +68,7 @@ impl<'a> Model<'a> {
             x: Vec::new(),
             row: Vec::new(),
             values: Vec::new(),
+            are_known: false,
             misses: 0,
             miss: None,
             fault: None,
@@ -77,14 +80,16 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Returns the value references of the state derivatives and of the states, if the FMU provides directional derivatives.
+/// Returns the value references of the state derivatives and of the states, if the FMU provides directional derivatives and none of them
+/// is an array without elements here.
 fn jacobian_of(description: &Description) -> Option<(Vec<u32>, Vec<u32>)> {
     description.offer(Interface::ModelExchange).filter(|offer| offer.directional_derivatives)?;
     let derivatives = description.elements(&description.derivatives);
     let pairs = derivatives.map(|derivative| {
         Some((derivative.reference, description.variables[derivative.derivative_of?].reference))
     });
-    pairs.collect::<Option<Vec<_>>>().map(|pairs| pairs.into_iter().unzip())
+    let pairs = pairs.collect::<Option<Vec<_>>>()?;
+    (pairs.len() == description.states).then(|| pairs.into_iter().unzip())
 }
 
 impl Parts<'_> {
@@ -129,6 +134,7 @@ impl Parts<'_> {
         if self.at == Some(time) && self.x == x {
             return Ok(());
         }
+        self.are_known = false;
         let Self { instance, inputs, moving, row, .. } = self;
         instance.sole().set_time(time)?;
         if !moving.is_empty() && (self.at.is_none() || inputs.is_moving()) {
@@ -144,26 +150,40 @@ impl Parts<'_> {
         Ok(())
     }
 
-    /// Reads the derivatives.
+    /// Reads the derivatives, or copies them if they were read last at this time and these states.
     #[inline]
     pub(super) fn derivatives(&mut self, time: f64, x: &[f64], values: &mut [f64]) -> Result<(), Rejection> {
-        self.set(time, x)?;
-        self.instance.sole().get_continuous(Continuous::Derivatives, values)
+        self.read_derivatives(time, x)?;
+        values.copy_from_slice(&self.values);
+        Ok(())
     }
 
-    /// Sets time, inputs and states, and evaluates the derivatives, so that outputs can be read. Some FMUs calculate other variables
-    /// only when the derivatives are read, and would otherwise return old values. Derivatives that the FMU cannot evaluate here are not
-    /// an error, because the solver does not use them.
+    /// Sets time, inputs and states, and evaluates the derivatives, so that outputs can be read. Some FMUs, such as those of
+    /// OpenModelica 1.12, calculate other variables only when the derivatives are read, and would otherwise return old values. Others,
+    /// such as those of OpenModelica 1.21, calculate them when they are read after time or states have been set, but not if the
+    /// derivatives were read in between, so both are set once more. Derivatives that the FMU cannot evaluate here are not an error,
+    /// because the solver does not use them.
     pub fn observe(&mut self, time: f64, x: &[f64]) -> Result<&mut SystemInstance, Rejection> {
-        self.at = None;
-        self.set(time, x)?;
-        if !x.is_empty()
-            && let Err(rejection) = self.read_derivatives(time, x)
-            && rejection.status() != Status::Discard
-        {
-            return Err(rejection);
+        if x.is_empty() {
+            self.at = None;
+            self.set(time, x)?;
+            return Ok(self.instance);
+        }
+        match self.read_derivatives(time, x) {
+            Err(rejection) if rejection.status() != Status::Discard => return Err(rejection),
+            _ => {
+                self.instance.sole().set_time(time)?;
+                self.instance.sole().set_continuous_states(x)?;
+            }
         }
         Ok(self.instance)
+    }
+
+    /// Notifies the FMU of a completed step. Returns whether it requests an event, and whether it requests the end of the simulation.
+    pub fn complete_step(&mut self, time: f64, x: &[f64]) -> Result<[bool; 2], Rejection> {
+        self.set(time, x)?;
+        self.are_known = false;
+        self.instance.sole().completed_integrator_step()
     }
 
     /// Evaluates the derivatives at the beginning of an interval and fails if one is not finite, because a shorter step would not
@@ -176,13 +196,16 @@ impl Parts<'_> {
         }
     }
 
-    /// Reads the derivatives into the buffer `values`.
+    /// Reads the derivatives into the buffer `values`, unless they are there already.
+    #[inline]
     fn read_derivatives(&mut self, time: f64, x: &[f64]) -> Result<(), Rejection> {
-        let mut values = std::mem::take(&mut self.values);
-        values.resize(x.len(), 0.0);
-        let result = self.derivatives(time, x, &mut values);
-        self.values = values;
-        result
+        self.set(time, x)?;
+        if !self.are_known {
+            self.values.resize(x.len(), 0.0);
+            self.instance.sole().get_continuous(Continuous::Derivatives, &mut self.values)?;
+            self.are_known = true;
+        }
+        Ok(())
     }
 
     /// Reads the event indicators. Fails if one is NaN.
@@ -276,6 +299,7 @@ impl Parts<'_> {
         let n = x.len();
         let (mut before, mut after, mut moved) = (vec![0.0; n], vec![0.0; n], x.to_vec());
         if let Some((derivatives, states)) = self.jacobian.take() {
+            self.are_known = false;
             let columns = self.set(time, x).and_then(|()| {
                 (0..n).try_for_each(|column| {
                     let state = &states[column..=column];
@@ -305,6 +329,7 @@ impl Parts<'_> {
 
 /// Returns the error for a value that is not finite or is too large.
 fn missing(what: &str, index: usize, value: f64, time: f64) -> Rejection {
+    let [value, time] = [value, time].map(shown_number);
     Rejection::without_fmu("Model Exchange", &format!("{what} {} is {value} at t = {time} s", index + 1))
 }
 

@@ -7,6 +7,7 @@ use super::model::Model;
 use super::{Integration, Solver};
 use crate::system_instance::SystemInstance;
 use fmi_abi::client::Rejection;
+use fmi_abi::shown_number;
 
 /// Functions of the caller that are called during a run.
 pub(crate) trait Hooks {
@@ -220,9 +221,24 @@ impl<'a> Simulation<'a> {
         Ok(changes)
     }
 
+    /// Handles an event in Event Mode, and the further events that the FMU announces for the same time, because values between them
+    /// belong to no time. Returns whether states or their nominal values have changed.
+    fn update(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
+        let mut changes = self.update_once(model, is_first)?;
+        while self.event.is_some_and(|next| next <= self.time) {
+            let scale = self.scale();
+            if let Some(since) = self.chatter.count(self.time, scale) {
+                return Err(self.chattering(Arrival::Stop, since));
+            }
+            model.parts().instance.sole().enter_event_mode()?;
+            changes |= self.update_once(model, false)?;
+        }
+        Ok(changes)
+    }
+
     /// Updates the discrete states in Event Mode until the event is complete, enters Continuous-Time Mode and reads the values that
     /// have changed. Returns whether states or their nominal values have changed.
-    fn update(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
+    fn update_once(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
         let mut parts = model.parts();
         let event = parts.instance.sole().event()?;
         if event.terminate {
@@ -235,6 +251,9 @@ impl<'a> Simulation<'a> {
         }
         if event.nominals_changed || is_first {
             parts.read_nominals()?;
+        }
+        if event.next.is_some_and(f64::is_nan) {
+            return Err(Rejection::without_fmu("Model Exchange", "the time of the next event is NaN"));
         }
         self.event = event.next;
         self.is_fresh = true;
@@ -261,11 +280,12 @@ impl<'a> Simulation<'a> {
             }
             Arrival::Event(None) => "the FMU requests an event after each step".to_owned(),
             _ => format!(
-                "the FMU announces events without end, the next one for t = {:?} s",
-                self.event.unwrap_or(self.time)
+                "the FMU announces events without end, the next one for t = {} s",
+                shown_number(self.event.unwrap_or(self.time))
             ),
         };
-        let text = format!("{cause}: {MOST_EVENTS} events from t = {since} s to t = {} s", self.time);
+        let [since, now] = [since, self.time].map(shown_number);
+        let text = format!("{cause}: {MOST_EVENTS} events from t = {since} s to t = {now} s");
         Rejection::without_fmu("Model Exchange", &text)
     }
 

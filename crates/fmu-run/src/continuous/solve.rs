@@ -3,8 +3,9 @@
 use super::Solver;
 use super::model::Model;
 use super::simulation::{Arrival, Hooks, Settings, Simulation};
-use super::stepping::Stepping;
+use super::stepping::{Stepping, equal_steps};
 use fmi_abi::client::Rejection;
+use fmi_abi::shown_number;
 use ivp::methods::{BDF, DOP853, DOPRI5, IntegrationResult, RK4, Tolerance};
 use ivp::status::Status;
 
@@ -112,13 +113,13 @@ impl Simulation<'_> {
             Solver::Bdf => BDF { max_step, first_step, max_steps: STEPS, ..BDF::default() }
                 .solve(model, time, &x, stop, relative, absolute, observer),
             Solver::Rk4 => {
-                let steps = max_step.map_or(1.0, |step| ((stop - time) / step - 1e-9).ceil().max(1.0));
+                let steps = equal_steps(stop - time, max_step);
                 RK4 { max_steps: usize::MAX, dense_output }.solve(
                     model,
                     time,
                     &x,
                     stop,
-                    (stop - time) / steps,
+                    (stop - time) / steps as f64,
                     observer,
                 )
             }
@@ -139,5 +140,5 @@ fn stuck(status: Status, time: f64) -> Rejection {
         }
         _ => "the solver does not converge",
     };
-    Rejection::without_fmu("Model Exchange", &format!("{why} at t = {time} s"))
+    Rejection::without_fmu("Model Exchange", &format!("{why} at t = {} s", shown_number(time)))
 }

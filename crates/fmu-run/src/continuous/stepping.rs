@@ -30,16 +30,29 @@ struct Point {
     z: Vec<f64>,
 }
 
+/// Returns the number of equal steps into which an interval of this length is divided, so that none exceeds the largest step.
+pub(super) fn equal_steps(length: f64, largest: Option<f64>) -> u64 {
+    largest.map_or(1.0, |largest| (length / largest - 1e-9).ceil().max(1.0)) as u64
+}
+
 impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
     pub fn of(simulation: &'s mut Simulation<'a>, model: &'s Model<'m>, hooks: &'s mut H, stop: f64) -> Self {
         Self { simulation, model, hooks, stop, arrival: None, failure: None, has_kink: false }
     }
 
-    /// Processes the whole interval as one step, for an FMU without states.
+    /// Processes the interval in equal steps that are not longer than the largest step, for an FMU without states.
     pub fn without_states(mut self) -> Result<Arrival, Rejection> {
         let (begin, stop) = (self.simulation.time, self.stop);
-        self.step([begin, stop], &[], &|_, _| ())?;
-        Ok(self.arrival.unwrap_or(Arrival::Stop))
+        let steps = equal_steps(stop - begin, self.simulation.settings.max_step);
+        for number in 1..=steps {
+            let end =
+                if number == steps { stop } else { begin + (stop - begin) * number as f64 / steps as f64 };
+            self.step([self.simulation.time, end], &[], &|_, _| ())?;
+            if let Some(arrival) = self.arrival {
+                return Ok(arrival);
+            }
+        }
+        Ok(Arrival::Stop)
     }
 
     /// Processes a step: locates an event in it, reads outputs at the communication points and notifies the FMU. `at` writes the
@@ -65,8 +78,7 @@ impl<'s, 'a, 'm, H: Hooks> Stepping<'s, 'a, 'm, H> {
         let mut parts = self.model.parts();
         let mut requested = [false; 2];
         if self.simulation.settings.reports_steps {
-            parts.set(end.time, &end.x)?;
-            requested = parts.instance.sole().completed_integrator_step()?;
+            requested = parts.complete_step(end.time, &end.x)?;
         }
         parts.accepted();
         drop(parts);

@@ -6,11 +6,11 @@ use fmu_test_kit::c_models::{library, pack};
 /// Returns the numbers of states and of event indicators.
 fn sizes(model: &str) -> (usize, usize) {
     let states = match model {
-        "stair" => 0,
+        "stair" | "wave" => 0,
         "ball" | "zeno" | "vanderpol" => 2,
         _ => 1,
     };
-    (states, usize::from(["ball", "zeno", "relay", "ending", "zero"].contains(&model)))
+    (states, usize::from(["ball", "zeno", "relay", "ending", "zero", "wave"].contains(&model)))
 }
 
 fn description2(model: &str, attributes: &str) -> String {
@@ -57,7 +57,8 @@ fn description3(model: &str, attributes: &str) -> String {
     let all: String = (0..states).map(state).collect();
     let derivatives: String =
         (0..states).map(|k| format!("<ContinuousStateDerivative valueReference=\"{}\"/>", 10 + k)).collect();
-    let indicators = "<EventIndicator valueReference=\"8\"/>".repeat(indicators);
+    let indicator = if states == 0 { 5 } else { 8 };
+    let indicators = format!("<EventIndicator valueReference=\"{indicator}\"/>").repeat(indicators);
     format!(
         r#"<fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="{{{model}}}">
         <ModelExchange modelIdentifier="equations" needsCompletedIntegratorStep="true" {attributes}/>

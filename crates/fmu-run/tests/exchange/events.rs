@@ -178,15 +178,58 @@ fn derivatives_may_change_at_an_event_after_a_step() {
 }
 
 #[test]
-fn outputs_are_up_to_date_although_the_fmu_calculates_them_with_the_derivatives() {
+fn outputs_are_up_to_date_whether_the_fmu_calculates_them_with_the_derivatives_or_only_without() {
     let time = times(1.0, 500);
     for standard in VERSIONS {
-        let runs = run(
-            &opened("stale", standard),
-            &time,
-            Batch { integration: tight(Solver::Auto), ..Batch::default() },
-        );
-        runs.trajectories.iter().zip(&time).for_each(|(found, time)| close(*found, (-time).exp(), 1e-7));
+        for (model, solver) in ["stale", "flagged"]
+            .into_iter()
+            .flat_map(|model| SOLVERS.into_iter().chain([Solver::Rk4]).map(move |solver| (model, solver)))
+        {
+            let batch = Batch { integration: tight(solver), ..Batch::default() };
+            let runs = run(&opened(model, standard), &time, batch);
+            runs.trajectories.iter().zip(&time).for_each(|(found, time)| close(*found, (-time).exp(), 1e-7));
+        }
+    }
+}
+
+/// An event that is announced for the time of the event before belongs to it: no value between them is shown.
+#[test]
+fn two_events_at_one_time() {
+    for standard in VERSIONS {
+        for time in [[0.0, 0.25, 0.5], [0.0, 0.5, 1.0]] {
+            let batch = Batch {
+                time: &time,
+                outputs: vec!["hits"],
+                every: Some(1),
+                events: true,
+                ..Batch::default()
+            };
+            let runs = opened("pair", standard).run(&batch, &Watch::default()).unwrap();
+            assert_eq!(runs.trajectories, time.map(|time| if time < 0.5 { 0.0 } else { 2.0 }));
+            let events: Vec<_> =
+                runs.events.iter().map(|event| (event.time, event.before[0], event.after[0])).collect();
+            assert_eq!(events, [(0.5, 0.0, 2.0)]);
+        }
+    }
+}
+
+#[test]
+fn the_largest_step_also_holds_without_states() {
+    for standard in VERSIONS {
+        let integration = Integration { max_step: Some(0.03), ..Integration::default() };
+        let batch = Batch {
+            time: &[0.0, 1.0],
+            outputs: vec!["hits"],
+            every: Some(1),
+            integration,
+            events: true,
+            ..Batch::default()
+        };
+        let runs = opened("wave", standard).run(&batch, &Watch::default()).unwrap();
+        assert_eq!(runs.trajectories, [0.0, 10.0]);
+        for (k, event) in runs.events.iter().enumerate() {
+            close(event.time, 0.05 + 0.1 * k as f64, 1e-12);
+        }
     }
 }
 

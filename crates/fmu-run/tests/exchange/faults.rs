@@ -54,6 +54,7 @@ fn errors_name_cause_and_time() {
                 announce.ends_with("the FMU announces events without end, the next one for t = 0.5 s: 1000 events from t = 0.5 s to t = 0.5 s"),
                 "{announce}"
             );
+            assert!(of("nowhere").ends_with("the time of the next event is NaN"));
             let relay = of("relay");
             assert!(
                 relay.contains("event indicator 1 changes its sign again and again: 1000 events from t = 1"),

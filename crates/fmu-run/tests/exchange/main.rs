@@ -134,7 +134,7 @@ fn settings_are_checked() {
     );
     assert_eq!(
         integration(Integration { rtol: Some(1e-16), ..default }),
-        "rtol is 0.0000000000000001; it must be at least 1e-13 and below 1"
+        "rtol is 1e-16; it must be at least 1e-13 and below 1"
     );
     assert_eq!(
         integration(Integration { atol: Some(-1.0), ..default }),
