@@ -67,6 +67,9 @@ pub struct Variable {
     pub clocked: bool,
     /// Whether the variable may be set only once per time instant.
     pub once_per_instant: bool,
+    /// Whether the variable is an input clock that the importer must activate at times that follow from its interval: a clock whose
+    /// `intervalVariability` is not `triggered` (section 2.2.8.1 of FMI 3.0).
+    pub is_periodic: bool,
     /// Description; empty if missing.
     pub description: String,
 }
@@ -559,6 +562,9 @@ fn variable(
         reinit: matches!(of_type.attribute("reinit"), Some("true" | "1")),
         clocked: node.attribute("clocks").is_some(),
         once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
+        is_periodic: node.has_tag_name("Clock")
+            && causality == Causality::Input
+            && node.attribute("intervalVariability").map(str::trim) != Some("triggered"),
         description: attribute_or_empty(node, "description"),
     }
 }

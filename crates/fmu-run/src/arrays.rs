@@ -33,20 +33,25 @@ pub(crate) struct Array {
     pub reference: u32,
     pub base: BaseType,
     sizes: Vec<usize>,
+    /// Number of elements.
+    pub length: usize,
     /// Start values as in the model description: one for all elements, or one for each.
     start: Vec<Arc<str>>,
 }
 
 impl Array {
-    /// Creates an array from its declaration in the model description.
-    pub fn new(of: &Variable, base: BaseType) -> Self {
+    /// Creates an array from its declaration in the model description. Returns `None` if its size is unknown or too large.
+    pub fn new(of: &Variable, base: BaseType) -> Option<Self> {
         let (reference, start) = (of.reference, of.start.iter().map(|start| Arc::from(&**start)).collect());
-        Self { reference, base, sizes: of.dimensions.clone().unwrap_or_default(), start }
+        let sizes = of.dimensions.clone()?;
+        let length = sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
+        let length = length.filter(|length| *length <= MAX_ELEMENTS)?;
+        Some(Self { reference, base, sizes, length, start })
     }
 
-    pub fn length(&self) -> Option<usize> {
-        let length = self.sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
-        length.filter(|length| *length <= MAX_ELEMENTS)
+    /// Returns whether the model description contains a start value for each element, and not one for all.
+    pub fn has_separate_starts(&self) -> bool {
+        self.start.len() > 1
     }
 
     /// Returns the start value of the element with this number, from 0, if there is one.
@@ -120,7 +125,7 @@ impl Arrays {
     /// Adds an array with this name. Returns the numbers of its elements, or `None` if there are too many or they need too much
     /// memory.
     pub fn push(&mut self, array: Array, name: &str) -> Option<Range<u32>> {
-        let length = array.length()?;
+        let length = array.length;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
         // The name of an element has an index for each dimension.
@@ -172,7 +177,7 @@ impl Arrays {
                 let begin = expanded.count;
                 expanded.references.push(self.all[array].reference);
                 expanded.arrays.push((array, begin));
-                expanded.count += self.all[array].length().unwrap_or_default();
+                expanded.count += self.all[array].length;
                 begin
             });
             expanded.indices.push(begin + number);

@@ -161,15 +161,23 @@ impl Description {
         if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
             return Err(format!("modelDescription.xml: {why}"));
         }
-        let event_indicators = match (written.standard, written.event_indicators) {
-            (Standard::Fmi2, None) => {
-                return Err("modelDescription.xml: numberOfEventIndicators is not a number".to_owned());
-            }
-            (_, count) => count.unwrap_or_default(),
-        };
-        if event_indicators > MAX_VALUES {
-            return Err(format!("modelDescription.xml: {event_indicators} event indicators are too many"));
+        if written.standard == Standard::Fmi2 && written.event_indicators.is_none() {
+            return Err("modelDescription.xml: numberOfEventIndicators is not a number".to_owned());
         }
+        let mut sizes = written.derivatives.iter().map(|of| written.variables[of.variable].size);
+        let states = sizes.try_fold(0_usize, |all, size| all.checked_add(size?));
+        // Only Model Exchange needs these numbers.
+        let count = |what: &str, count: Option<usize>| match count {
+            Some(count) if count > MAX_VALUES => {
+                Err(format!("modelDescription.xml: {count} {what} are too many"))
+            }
+            None if written.model_exchange.is_some() => Err(format!(
+                "modelDescription.xml: the number of {what} is unknown, because an array has an unknown size"
+            )),
+            count => Ok(count.unwrap_or(0)),
+        };
+        let event_indicators = count("event indicators", written.event_indicators)?;
+        let states = count("continuous states", states)?;
         let largest = written.variables.iter().map(|of| of.reference).max();
         let mut arrays = Arrays::after(largest.unwrap_or_default());
         let elements: Vec<_> = written.variables.iter().map(|of| elements_of(of, &mut arrays)).collect();
@@ -184,10 +192,6 @@ impl Description {
             spans.push(begin..variables.len());
         }
         relate(&written, &spans, &mut variables);
-        let states: usize = written.derivatives.iter().map(|of| spans[of.variable].len()).sum();
-        if states > MAX_VALUES {
-            return Err(format!("modelDescription.xml: {states} continuous states are too many"));
-        }
         Ok(Self {
             states,
             event_indicators,
@@ -212,6 +216,9 @@ impl Description {
 
     /// Returns the reason why a variable of the file is not in `variables`; `None` if it is, or if it does not exist.
     pub(crate) fn why_missing(&self, name: &str) -> Option<&'static str> {
+        if self.indices.is_shared(name, |index| &self.variables[index].name) {
+            return Some("is the name of several variables in modelDescription.xml");
+        }
         let of = self.written.variables.iter().find(|of| of.name == name)?;
         match (of.base, &of.dimensions) {
             (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
@@ -226,6 +233,12 @@ impl Description {
             _ if self.variable(&format!("{name}[1]")).is_some() => None,
             _ => Some("is an array with too many elements; FMPy sets and reads it"),
         }
+    }
+
+    /// Returns the name of a clock without whose ticks the FMU does not calculate what it should. A triggered input clock ticks only
+    /// when the importer wants it to.
+    pub(crate) fn unsupported_clock(&self) -> Option<&str> {
+        self.written.variables.iter().find(|of| of.is_periodic).map(|of| of.name.as_str())
     }
 
     /// Returns the variable with this name, if there is one.
@@ -389,7 +402,7 @@ fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
     match sizes.is_empty() {
         true => Some(0..1),
-        false => arrays.push(Array::new(of, base), &of.name),
+        false => arrays.push(Array::new(of, base)?, &of.name),
     }
 }
 

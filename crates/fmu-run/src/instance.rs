@@ -6,9 +6,9 @@ use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::library::Library;
 use crate::messages::Logging;
-use fmi_abi::Interface;
 use fmi_abi::client::{Rejection, Settings, VariableNames};
 use fmi_abi::description::ModelDescription;
+use fmi_abi::{Interface, shown_number};
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
@@ -18,10 +18,10 @@ pub struct Instance {
     // First field, so that it is dropped before the library is unloaded.
     pub(crate) client: fmi_abi::client::Instance,
     _library: Arc<Library>,
-    description: Arc<Description>,
+    pub(crate) description: Arc<Description>,
     pub(crate) arrays: Arc<Arrays>,
     /// Values of arrays that were set before Initialization Mode; `None` from Initialization Mode on. They are stored because
-    /// setting one element passes the whole array, and arrays cannot be read before Initialization Mode.
+    /// setting one element passes the whole array, and some FMUs return other values before Initialization Mode.
     pub(crate) array_starts: Option<ArrayStartValues>,
 }
 
@@ -39,6 +39,7 @@ pub(crate) fn check_equal_step(model: &str, first: f64, size: f64, time: f64) ->
     if (size - first).abs() <= 1e-9 * first + 4.0 * f64::EPSILON * time.abs() {
         return Ok(());
     }
+    let [first, size, time] = [first, size, time].map(shown_number);
     request(format!(
         "{model} needs steps of equal size (canHandleVariableCommunicationStepSize is not true), but the first step has {first} s and \
         the step from {time} s has {size} s"
@@ -62,7 +63,7 @@ impl Tolerance {
     pub(crate) fn check(self) -> Result<(), Error> {
         match self {
             Self::Value(value) if !(value > 0.0 && value.is_finite()) => {
-                request(format!("tolerance is {value}; it must be above 0 and finite"))
+                request(format!("tolerance is {}; it must be above 0 and finite", shown_number(value)))
             }
             _ => Ok(()),
         }

@@ -6,7 +6,7 @@ use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::lookup::Found;
 use fmi_abi::client::Rejection;
-use fmi_abi::{BaseType, Standard};
+use fmi_abi::{BaseType, Standard, shown_number};
 use std::collections::HashMap;
 
 /// Variables that have been looked up by name, and whose values are numbers or Booleans. A row has one value for each name, in
@@ -242,9 +242,14 @@ pub(crate) fn fits(name: &str, (base, standard): (BaseType, Standard), values: &
     match values.iter().find(|value| value.fract() != 0.0 || !fits(**value)) {
         None => Ok(()),
         Some(value) if base == BaseType::Boolean => {
-            request(format!("{name} is a Boolean and cannot be {value}"))
+            request(format!("{name} is a Boolean and cannot be {}", shown_number(*value)))
         }
-        Some(value) if value.fract() != 0.0 => request(format!("{name} is an integer and cannot be {value}")),
-        Some(value) => request(format!("{name} is an integer from {low} to {high} and cannot be {value}")),
+        Some(value) if value.fract() != 0.0 => {
+            request(format!("{name} is an integer and cannot be {}", shown_number(*value)))
+        }
+        Some(value) => {
+            let value = shown_number(*value);
+            request(format!("{name} is an integer from {low} to {high} and cannot be {value}"))
+        }
     }
 }

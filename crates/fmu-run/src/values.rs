@@ -3,7 +3,7 @@
 use crate::arrays::{Array, ArrayStartValues};
 use crate::instance::Instance;
 use fmi_abi::client::{Instance as Client, Rejection};
-use fmi_abi::{BaseType, Value};
+use fmi_abi::{BaseType, Value, boolean};
 use std::collections::HashMap;
 
 type Called = Result<(), Rejection>;
@@ -41,8 +41,11 @@ impl Scalar for f64 {
         &mut starts.numbers
     }
 
-    fn read(_: BaseType, start: &str) -> Option<Self> {
-        if start == "true" { Some(1.0) } else { start.parse().ok() }
+    fn read(base: BaseType, start: &str) -> Option<Self> {
+        match base {
+            BaseType::Boolean => boolean(start).map(|start| f64::from(u8::from(start))),
+            _ => start.parse().ok(),
+        }
     }
 }
 
@@ -99,23 +102,29 @@ impl Instance {
     /// Sets variables, some of which are array elements. All other elements of the arrays keep their values.
     #[cold]
     fn set_elements<T: Scalar>(&mut self, base: BaseType, vr: &[u32], values: &[T]) -> Result<(), Rejection> {
-        let Self { client, arrays, array_starts, .. } = self;
+        let Self { client, arrays, array_starts, description, .. } = self;
         let expanded = arrays.expanded(vr);
         let mut all = vec![T::ZERO; expanded.count];
-        if let Some(starts) = array_starts {
-            for (index, begin) in &expanded.arrays {
-                let array = &arrays.all()[*index];
-                let known = T::set_before(starts).entry(*index).or_insert_with(|| declared(array));
-                all[*begin..][..known.len()].clone_from_slice(known);
+        match array_starts {
+            _ if expanded.is_complete() => {}
+            None => T::get(client, base, &expanded.references, &mut all)?,
+            Some(starts) => {
+                for (index, begin) in &expanded.arrays {
+                    let (array, before) = (&arrays.all()[*index], T::set_before(starts));
+                    let to = &mut all[*begin..][..array.length];
+                    match before.get(index) {
+                        Some(known) => to.clone_from_slice(known),
+                        None if declared(array, !description.structure.is_empty(), to) => {}
+                        None => T::get(client, base, &[array.reference], to)?,
+                    }
+                }
             }
-        } else if !expanded.is_complete() {
-            T::get(client, base, &expanded.references, &mut all)?;
         }
         expanded.indices.iter().zip(values).for_each(|(index, value)| all[*index].clone_from(value));
         T::set(client, base, &expanded.references, &all)?;
         if let Some(starts) = array_starts {
             for (index, begin) in &expanded.arrays {
-                let length = arrays.all()[*index].length().unwrap_or_default();
+                let length = arrays.all()[*index].length;
                 T::set_before(starts).insert(*index, all[*begin..][..length].to_vec());
             }
         }
@@ -123,8 +132,14 @@ impl Instance {
     }
 }
 
-/// Returns the start values of an array in the model description.
-fn declared<T: Scalar>(array: &Array) -> Vec<T> {
-    let start = |number| array.start(number).and_then(|start| T::read(array.base, start)).unwrap_or(T::ZERO);
-    (0..array.length().unwrap_or_default()).map(start).collect()
+/// Writes the start values in the model description to `to`. Returns whether they are known: separate start values of the elements are
+/// not if a structural parameter has been changed, because they are for the default sizes (section 2.4.7.5 of FMI 3.0).
+fn declared<T: Scalar>(array: &Array, is_configured: bool, to: &mut [T]) -> bool {
+    if is_configured && array.has_separate_starts() {
+        return false;
+    }
+    to.iter_mut().enumerate().all(|(number, to)| {
+        let start = array.start(number).and_then(|start| T::read(array.base, start));
+        start.map(|start| *to = start).is_some()
+    })
 }

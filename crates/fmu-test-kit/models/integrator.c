@@ -21,6 +21,7 @@
      tolerance          has a solver that uses the tolerance of the experiment: Dymola
      stop_time          needs a stop time: exports of tools with a fixed simulation interval
      pending            performs steps of FMI 2.0 in a thread and returns fmi2Pending: FMUs that run asynchronously
+     equal_steps        rejects a step whose size differs from the first one in any bit: controllers with a fixed sample time
      warning            returns a warning from every call that reads or sets values or makes a step: Hopsan
      discard            returns fmi2Discard from t = 0.5 on: Dymola at an event that it cannot handle
      once               allows only one instance per process: JModelica, 20-sim
@@ -67,6 +68,7 @@ struct Model {
     /* Kept by a reset and by restored states. */
     int file, ends;
     double step_size, no_value;
+    double first_size;
     pthread_t thread;
 };
 
@@ -251,6 +253,8 @@ static int step(Model *m, double point, double size) {
     if (IS(other_environment) && late) { LOG(f, ERROR, "error", "the stranger gives up"); return ERROR; }
     if (IS(discard) && late) { LOG(f, DISCARD, "error", "the step is too large"); return DISCARD; }
     if (f->steps == (int)m->fails) return ERROR;
+    if (f->steps == 0) m->first_size = size;
+    if (IS(equal_steps) && size != m->first_size) { LOG(f, ERROR, "error", "the step has another size"); return ERROR; }
     if (IS(pending) && f->fmi == 2) {
         m->step_size = size, f->asynchronous = 1;
         pthread_create(&m->thread, NULL, compute, m);

@@ -11,7 +11,7 @@ use crate::lookup::is_exact;
 use crate::selection::{Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
-use fmi_abi::{BaseType, Interface, Standard};
+use fmi_abi::{BaseType, Interface, Standard, shown_number};
 
 /// A checked batch.
 pub(super) struct Plan<'a> {
@@ -32,6 +32,8 @@ pub(super) struct Plan<'a> {
     pub reuse: bool,
     pub tolerance: Tolerance,
     pub interface: Interface,
+    /// Size of each step in Co-Simulation, s, if an FMU needs steps of equal size.
+    pub step: Option<f64>,
     /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
     pub model_exchange: Option<ModelExchangePlan<'a>>,
 }
@@ -58,6 +60,7 @@ impl<'a> Plan<'a> {
             reuse: batch.reuse,
             tolerance: batch.tolerance,
             interface,
+            step: None,
             model_exchange: None,
         };
         if batch.every == Some(0) {
@@ -76,6 +79,7 @@ impl<'a> Plan<'a> {
                 check_of_co_simulation(batch)?;
                 if let Some(model) = system.fixed_step() {
                     check_equal_steps(model, time)?;
+                    plan.step = Some((time[time.len() - 1] - time[0]) / (time.len() - 1) as f64);
                 }
                 plan.find_inputs(system, batch)?;
             }
@@ -137,7 +141,7 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
         return request(format!("time[{index}] is {}; times must be finite", time[index]));
     }
     if let Some(index) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let [before, after] = [time[index], time[index + 1]];
+        let [before, after] = [time[index], time[index + 1]].map(shown_number);
         return request(format!(
             "time[{}] is {after}, which is not after time[{index}], {before}",
             index + 1

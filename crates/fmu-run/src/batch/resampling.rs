@@ -1,6 +1,7 @@
 //! Interpolates inputs that have their own times, which need not be communication points.
 
 use crate::error::{Error, request};
+use fmi_abi::shown_number;
 
 /// Maps the communication points to the times of an input.
 pub(super) struct Resampling {
@@ -23,7 +24,7 @@ impl Resampling {
             return request(format!("time {index} of {name} is {}; times must be finite", times[index]));
         }
         if let Some(index) = times.windows(2).position(|pair| pair[1] < pair[0]) {
-            let (before, after) = (times[index], times[index + 1]);
+            let [before, after] = [times[index], times[index + 1]].map(shown_number);
             return request(format!("the times of {name} decrease: {after} follows {before}"));
         }
         let times: Vec<_> = times.iter().map(|time| rounded_to(points, *time)).collect();

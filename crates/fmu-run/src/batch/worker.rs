@@ -11,8 +11,8 @@ use crate::instance::Experiment;
 use crate::messages::{Feed, Logging};
 use crate::system::System;
 use crate::system_instance::SystemInstance;
-use fmi_abi::Value;
 use fmi_abi::client::Rejection;
+use fmi_abi::{Value, shown_number};
 use std::sync::Arc;
 use std::time;
 
@@ -194,7 +194,7 @@ impl<'a> Worker<'a> {
             return Ok(Some(rejection.to_string()));
         }
         let text = match at {
-            Some((_, time)) if rejected => format!("at {time} s: {rejection}"),
+            Some((_, time)) if rejected => format!("at {} s: {rejection}", shown_number(time)),
             _ => rejection.to_string(),
         };
         Err(Failure { at: at.map(|(index, _)| index), text, is_silent: rejection.is_silent() })
@@ -251,7 +251,8 @@ impl<'a> Worker<'a> {
                 self.set_inputs(instance, k).map_err(at)?;
             }
             if let Some(next) = times.get(k + 1) {
-                let size = next - time;
+                // An FMU that needs steps of equal size may compare them, and the differences between times have rounding errors.
+                let size = plan.step.unwrap_or(next - time);
                 if let Err(rejection) = instance.step(time, size) {
                     let Some(end) = rejection.ended() else { return Err(at(rejection)) };
                     // Now outputs can be read, but inputs can no longer be set (section 4.2.4 of FMI 2.0).

@@ -6,6 +6,7 @@ use crate::instance::Instance;
 use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
 use fmi_abi::client::{Event, Rejection};
+use fmi_abi::shown_number;
 
 #[derive(Debug)]
 /// An instance with its state.
@@ -22,9 +23,18 @@ pub(super) struct Entry {
 #[derive(Debug, Default)]
 pub(super) struct Progress {
     pub time: f64,
-    /// Size of the first step since the initialization, s.
+    /// Size of the first step since the initialization, s, if an FMU needs steps of equal size.
     pub first_step: Option<f64>,
     pub event: Event,
+}
+
+impl Progress {
+    /// Performs a step of this size, s, or of the size of the first step, from which it may differ by a rounding error, if the FMU needs
+    /// steps of equal size.
+    #[inline]
+    pub fn step(&self, instance: &mut SystemInstance, size: f64) -> Result<(), Rejection> {
+        instance.step(self.time, self.first_step.unwrap_or(size))
+    }
 }
 
 impl Entry {
@@ -45,7 +55,7 @@ impl Entry {
             Ok(Err(rejection)) => rejection.to_string(),
             Err(panic) => panic,
         };
-        *error = Some(format!("at {} s: {why}", progress.time));
+        *error = Some(format!("at {} s: {why}", shown_number(progress.time)));
         false
     }
 }

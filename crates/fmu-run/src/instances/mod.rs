@@ -19,8 +19,8 @@ use crate::system::System;
 use crate::system_instance::SystemInstance;
 use crate::threads::Threads;
 use entry::{Entry, Progress, each, empty, in_parts, rows};
-use fmi_abi::Interface;
 use fmi_abi::client::{Event, Rejection};
+use fmi_abi::{Interface, shown_number};
 use std::sync::Arc;
 
 /// Settings for new instances.
@@ -274,7 +274,7 @@ impl Instances {
         check_size(size)?;
         self.check_equal_steps(|_| size, mask)?;
         self.alive(mask, |_, progress, instance| {
-            instance.step(progress.time, size)?;
+            progress.step(instance, size)?;
             progress.time += size;
             Ok(())
         });
@@ -290,13 +290,14 @@ impl Instances {
         let mut ahead = self.all.iter().enumerate().filter(|(index, one)| one.acts(*index, mask));
         if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.progress.time)) {
             return request(format!(
-                "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
-                one.progress.time
+                "to is {} s; it must be after the time of each instance, and instance {index} is at {} s",
+                shown_number(time),
+                shown_number(one.progress.time)
             ));
         }
         self.check_equal_steps(|progress| time - progress.time, mask)?;
         self.alive(mask, |_, progress, instance| {
-            instance.step(progress.time, time - progress.time)?;
+            progress.step(instance, time - progress.time)?;
             progress.time = time;
             Ok(())
         });
@@ -323,7 +324,7 @@ impl Instances {
         let inputs = rows(values, set.len(), self.len());
         self.fill(get.len(), read, |index, progress, instance, row| {
             instance.set(set, inputs(index))?;
-            instance.step(progress.time, size)?;
+            progress.step(instance, size)?;
             progress.time += size;
             instance.get(get, row)
         });
@@ -390,7 +391,7 @@ fn check_size(size: f64) -> Result<(), Error> {
     if size.is_finite() && size > 0.0 {
         return Ok(());
     }
-    request(format!("the size of a step is {size} s; it must be above 0 and finite"))
+    request(format!("the size of a step is {} s; it must be above 0 and finite", shown_number(size)))
 }
 
 /// Sets start values and initializes an instance, so that it can perform its first step. Returns the result of the initial event in

@@ -19,7 +19,7 @@ use crate::messages::Feed;
 use crate::pool::Pool;
 use crate::selection::Selection;
 pub use elements::Elements;
-use fmi_abi::description::Offer;
+use fmi_abi::description::{Fault, Offer};
 use fmi_abi::files::Limits;
 use fmi_abi::{BaseType, Causality, Interface, Value, shown};
 pub(crate) use order::Exchange;
@@ -252,7 +252,7 @@ impl System {
             .map(|component| &*component.fmu)
     }
 
-    /// Fails if a component does not support this interface type, or if a system is to run in Model Exchange.
+    /// Fails if a component does not support this interface type or needs clocks, or if a system is to run in Model Exchange.
     pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
         if interface == Interface::ModelExchange && self.sole().is_none() {
             return Err(Error::Fmu(format!(
@@ -260,7 +260,23 @@ impl System {
                 self.name()
             )));
         }
-        self.components().iter().try_for_each(|component| component.fmu.library(interface).map(drop))
+        for Component { name, fmu } in self.components() {
+            if let Some(clock) = fmu.description.unsupported_clock() {
+                return Err(Error::Fmu(format!(
+                    "{} is an input clock that must tick at its own times, and clocks are not supported here, so it would never tick",
+                    joined(name, clock)
+                )));
+            }
+            // States and event indicators would be missing. In Co-Simulation their number does not matter.
+            let mut faults = fmu.description.faults.iter();
+            if interface == Interface::ModelExchange
+                && let Some((_, why)) = faults.find(|(fault, _)| *fault == Fault::Structure)
+            {
+                return Err(Error::Fmu(format!("modelDescription.xml: {why}")));
+            }
+            fmu.library(interface)?;
+        }
+        Ok(())
     }
 
     /// Returns the interface type of runs: the requested one, or Co-Simulation by default. For a single FMU that has only Model

@@ -320,6 +320,25 @@ fn steps_have_the_same_size_if_the_fmu_needs_it() {
     }
 }
 
+/// Differences between the times of a grid have rounding errors, but all steps have one size if an FMU needs it.
+#[test]
+fn steps_have_the_same_size_to_the_last_bit_if_the_fmu_needs_it() {
+    let time: Vec<_> = (0..=30).map(|k| 100.0 + 0.1 * f64::from(k)).collect();
+    assert!(time.windows(2).any(|pair| pair[1] - pair[0] != time[1] - time[0]));
+    let changes = [("canHandleVariableCommunicationStepSize=\"true\"", "")];
+    for standard in VERSIONS {
+        let fmu = opened_with("equal_steps", standard, &changes).system().clone();
+        let batch = Batch { time: &time, outputs: vec!["y"], every: Some(1), ..Batch::default() };
+        assert_eq!(fmu.run(&batch, &Watch::default()).unwrap().errors, []);
+        let setup = Setup { start_time: time[0], ..Setup::default() };
+        let mut one = fmu.instances(&setup).unwrap();
+        time[1..].iter().for_each(|time| one.step_to(*time, None).unwrap());
+        one.reset(None);
+        time.windows(2).for_each(|pair| one.step(pair[1] - pair[0], None).unwrap());
+        assert_eq!(one.errors().count(), 0);
+    }
+}
+
 /// Variables of different types may have the same value reference (section 2.2.7 of FMI 2.0).
 #[test]
 fn value_references_are_unique_only_within_a_type() {
@@ -507,6 +526,26 @@ fn structural_parameters_change_the_sizes_of_arrays() {
     one.reset(None);
     one.get(&selection, &mut sum);
     assert_eq!(sum, [16.0], "a reset must keep the start values");
+    // The start values in the model description are for the default size, so the FMU is asked for the others.
+    let start = vec![("size", Start::Same(2.0)), ("vector[1]", Start::Same(10.0))];
+    let runs =
+        fmu.run(&Batch { time: &time, start, outputs: vec!["sum"], ..Batch::default() }, &Watch::default());
+    assert_eq!(runs.unwrap().errors, []);
+    let halves = "start=\"1 2 3\"><Dimension";
+    let fmu_of = |starts: &str| opened_with("plain", Standard::Fmi3, &[(halves, starts)]).system().clone();
+    for (starts, size, sum) in [
+        // Other start values than the FMU has after its size has changed, which are 1 2 3 4.
+        ("start=\"7 8 9\"><Dimension", 4.0, 10.0 + 2.0 + 3.0 + 4.0),
+        ("start=\"7 8 9\"><Dimension", 3.0, 10.0 + 2.0 + 3.0),
+        // One start value is for all elements, of any number of them.
+        ("start=\"7\"><Dimension", 4.0, 10.0 + 3.0 * 7.0),
+        // No start value: nothing is invented.
+        ("start=\"\"><Dimension", 3.0, 10.0 + 2.0 + 3.0),
+    ] {
+        let start = vec![("size", Start::Same(size)), ("vector[1]", Start::Same(10.0))];
+        let batch = Batch { time: &time, start, outputs: vec!["sum"], every: Some(2), ..Batch::default() };
+        assert_eq!(fmu_of(starts).run(&batch, &Watch::default()).unwrap().trajectories, [sum], "{starts}");
+    }
     let wrong =
         |start| fmu.instances(&Setup { start, count: 2, ..Setup::default() }).unwrap_err().to_string();
     assert!(wrong(vec![("size", Start::Each(&[1.0, 2.0]))]).contains("one value for all"));

@@ -3,7 +3,7 @@
 use crate::built::built;
 use crate::end;
 use fmi_abi::write::zip;
-use fmu_run::{Error, Fmu, Order, Standard, System};
+use fmu_run::{Batch, Error, Fmu, Order, Setup, Standard, System, Watch};
 use std::path::Path;
 
 fn opened(path: &Path) -> Result<System, String> {
@@ -128,6 +128,37 @@ fn libraries_have_plain_names() {
     }
 }
 
+/// Two variables of one name cannot be told apart, but the others can be used.
+#[test]
+fn variables_of_one_name_are_an_error() {
+    let directory = tempfile::tempdir().unwrap();
+    for standard in [Standard::Fmi2, Standard::Fmi3] {
+        let path = built("plain", standard, directory.path(), &[("name=\"gain\"", "name=\"tolerance\"")]);
+        let fmu = opened(&path).unwrap();
+        assert_eq!(end(&fmu), Ok(1.0));
+        let why = fmu.select(&["tolerance"]).unwrap_err().to_string();
+        assert_eq!(why, "tolerance is the name of several variables in modelDescription.xml");
+    }
+}
+
+/// A state or an event indicator that does not exist is an error in Model Exchange. Co-Simulation does not need it.
+#[test]
+fn a_model_structure_with_unknown_variables_is_an_error_in_model_exchange() {
+    let directory = tempfile::tempdir().unwrap();
+    for (standard, entry) in [
+        (Standard::Fmi2, "<ModelStructure><Derivatives><Unknown index=\"777\"/></Derivatives>"),
+        (Standard::Fmi3, "<ModelStructure><EventIndicator valueReference=\"777\"/>"),
+    ] {
+        let structure = ("<ModelStructure>", entry);
+        let path = built("plain", standard, directory.path(), &[structure]);
+        assert_eq!(opened(&path).and_then(|fmu| end(&fmu)), Ok(1.0));
+        let changes = [structure, ("<CoSimulation", "<ModelExchange")];
+        let path = built("plain", standard, directory.path(), &changes);
+        let why = opened(&path).and_then(|fmu| end(&fmu)).unwrap_err();
+        assert_eq!(why, "modelDescription.xml: ModelStructure refers to 777, which does not exist");
+    }
+}
+
 #[test]
 fn clocks_are_named() {
     let directory = tempfile::tempdir().unwrap();
@@ -140,4 +171,19 @@ fn clocks_are_named() {
     assert!(why.starts_with("tick is a clock, and clocks are not supported here"), "{why}");
     let why = fmu.select(&["ticks"]).unwrap_err().to_string();
     assert!(why.starts_with("ticks has a value only while its clock ticks"), "{why}");
+    // The importer need not activate a triggered clock, but without ticks at its own times another clock has no effect.
+    let run = |path: &Path| {
+        // SAFETY: the FMU of this test.
+        let fmu = unsafe { Fmu::open(path) }.unwrap();
+        let batch = Batch { time: &[0.0, 1.0], outputs: vec!["y"], ..Batch::default() };
+        let made = fmu.system().instances(&Setup::default()).map(drop);
+        (fmu.system().run(&batch, &Watch::default()).map(drop), made)
+    };
+    assert_eq!(run(&path), (Ok(()), Ok(())));
+    let periodic = clock.replace("\"triggered\"", "\"constant\" intervalDecimal=\"0.1\"");
+    let path = built("plain", Standard::Fmi3, directory.path(), &[("<ModelVariables>", &periodic)]);
+    let why = Err(Error::Fmu(
+        "tick is an input clock that must tick at its own times, and clocks are not supported here, so it would never tick".to_owned(),
+    ));
+    assert_eq!(run(&path), (why.clone(), why));
 }
