@@ -246,6 +246,29 @@ def test_whole_arrays_in_runs(rods) -> None:
         assert np.array_equal(one, other)
 
 
+def test_events_have_their_own_values_after_arrays_of_strings(rods) -> None:
+    def use(fmu):
+        def run(outputs):
+            arguments = {
+                "interface": "model-exchange",
+                "start": {"T[8]": 29.99},
+                "events": True,
+                "measures": ["end"],
+                "every": 1,
+            }
+            return fmu.run(np.linspace(0.0, 2.0, 5), outputs=outputs, **arguments).check()
+
+        runs, alone = run(["labels", "mean", "reports", "T", "hot"]), run(["mean", "T", "hot"])
+        assert runs["reports"].shape == (1, 5, 2) and runs["reports"][0, 0, 0] == "the near half is well"
+        assert runs["labels"][0, -1].tolist() == ["the near half", "the far half"]
+        for name in ("mean", "T", "hot"):
+            assert np.array_equal(runs[name], alone[name]) and np.array_equal(runs[name, "end"], alone[name, "end"])
+        assert runs.events == alone.events and runs.events[0].before != runs.events[0].after
+        return runs.events
+
+    both(rods, use)
+
+
 def test_whole_arrays_of_inputs_for_each_run(rods) -> None:
     time = np.linspace(0.0, 1.0, 5)
     power = np.random.default_rng(2).uniform(0.0, 9.0, (3, 5, 2))

@@ -32,7 +32,7 @@ mod threads;
 mod unit;
 mod values;
 
-pub use batch::{Batch, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};
+pub use batch::{Batch, Column, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};
 pub use continuous::{Integration, Solver};
 pub use description::{Attributes, Dependencies, Description, Variable};
 pub use error::Error;

@@ -53,15 +53,14 @@ class Loaded:
         reuse: bool,
     ) -> tuple[
         _Array,
-        list[str],
+        list[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None]],
         _Array,
         list[str],
         _Array | None,
         list[tuple[int, str]],
         list[tuple[int, str]],
         dict[str, Any],
-        dict[str, tuple[tuple[int, ...], list[str]]] | None,
-        dict[str, NDArray[Any]],
+        dict[str, tuple[tuple[int, ...], list[str]]],
         list[tuple[int, float, list[float], list[float]]],
         BaseException | None,
     ]: ...

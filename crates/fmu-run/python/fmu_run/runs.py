@@ -44,6 +44,26 @@ class Event(NamedTuple):
     after: dict[str, float]
 
 
+class _Column(NamedTuple):
+    """An output, or an element of a whole array among the outputs."""
+
+    name: str
+    shape: tuple[int, ...]
+    elements: list[str]
+    #: Index of the first column in trajectories, statistics and events; None if float64 cannot represent the values.
+    first: int | None
+    #: (runs, times, ...): the values if float64 cannot represent them.
+    exact: NDArray[Any] | None
+
+    def of_elements(self) -> Iterator[_Column]:
+        for number, element in enumerate(self.elements):
+            first = None if self.first is None else self.first + number
+            exact = self.exact
+            if exact is not None:
+                exact = exact.reshape(*exact.shape[:2], -1)[..., number]
+            yield _Column(element, (), [element], first, exact)
+
+
 class Runs(Mapping[str, _Array]):
     """Results of `Fmu.run`: time series by output, and statistics by output and measure.
 
@@ -69,31 +89,30 @@ class Runs(Mapping[str, _Array]):
     def __init__(
         self,
         time: _Array,
-        outputs: Sequence[str],
+        columns: Iterable[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None]],
         trajectories: _Array,
         measures: Sequence[str],
         measured: _Array | None,
         errors: Iterable[tuple[int, str]],
         notes: Iterable[tuple[int, str]],
         start: Mapping[str, Any],
-        arrays: Mapping[str, tuple[tuple[int, ...], list[str]]] | None = None,
-        exact: Mapping[str, NDArray[Any]] | None = None,
+        arrays: Mapping[str, tuple[tuple[int, ...], list[str]]],
         events: Iterable[tuple[int, float, list[float], list[float]]] = (),
     ):
         self.time, self._errors, self.notes = time, dict(errors), dict(notes)
         self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
         self._trajectories, self._measured = trajectories, measured
-        self._outputs, self._measures, self._start = outputs, measures, start
-        #: Shape and element names of each array among the outputs and start values.
-        self._arrays = arrays or {}
-        #: Outputs whose values float64 cannot represent.
-        self._exact = exact or {}
+        #: The outputs, in which each column occurs in one place.
+        self._outputs = [_Column(*column) for column in columns]
+        self._measures, self._start = measures, start
+        #: Shape and element names of each array among the start values.
+        self._arrays = arrays
         self._events = list(events)
 
     @cached_property
     def events(self) -> list[Event]:
         """The events of all runs in Model Exchange, sorted by run and time. Empty unless `Fmu.run` was called with events=True."""
-        names = [element for name in self._numbers for element in self._elements(name)]
+        names = [element for column in self._outputs if column.first is not None for element in column.elements]
         return [
             Event(run, time, dict(zip(names, before, strict=True)), dict(zip(names, after, strict=True)))
             for run, time, before, after in self._events
@@ -105,34 +124,19 @@ class Runs(Mapping[str, _Array]):
         return {
             name: value
             if isinstance(value, str | bytes)
-            else np.broadcast_to(_column(value), (self.count, *self._shape(name)))
+            else np.broadcast_to(_column(value), (self.count, *(self._arrays[name][0] if name in self._arrays else ())))
             for name, value in self._start.items()
         }
 
     @cached_property
-    def _columns(self) -> dict[str, int]:
-        """Index of the first column of each output in the results, and of the column of each array element."""
-        columns: dict[str, int] = {}
-        elements: dict[str, int] = {}
-        first = 0
-        for name in self._outputs:
-            if name in self._exact:
-                continue
-            columns[name] = first
-            elements |= {element: first + k for k, element in enumerate(self._elements(name))}
-            first += len(self._elements(name))
-        return elements | columns
+    def _columns(self) -> dict[str, _Column]:
+        """The outputs by name."""
+        return {column.name: column for column in self._outputs}
 
-    @property
-    def _numbers(self) -> list[str]:
-        """Names of the outputs that have measures."""
-        return [name for name in self._outputs if name not in self._exact]
-
-    def _shape(self, name: str) -> tuple[int, ...]:
-        return self._arrays[name][0] if name in self._arrays else ()
-
-    def _elements(self, name: str) -> list[str]:
-        return self._arrays[name][1] if name in self._arrays else [name]
+    @cached_property
+    def _elements(self) -> dict[str, _Column]:
+        """The elements of the outputs by name. There may be many."""
+        return {element.name: element for column in self._outputs for element in column.of_elements()}
 
     @property
     def count(self) -> int:
@@ -163,27 +167,29 @@ class Runs(Mapping[str, _Array]):
 
     def __getitem__(self, key: str | tuple[str, str]) -> _Array:
         output, *measure = (key,) if isinstance(key, str) else key if isinstance(key, tuple) else (None,)
-        if output in self._exact:
-            if measure:
-                raise KeyError(f"{output} has no measures; only numbers up to 2**53 have")
-            return self._exact[output]
-        if output not in self._columns or len(measure) > 1:
-            raise KeyError(
-                f"no output {output if isinstance(output, str) else key!r} was requested; there are {', '.join(self._outputs)}"
-            )
+        column = None
+        if isinstance(output, str) and len(measure) < 2:
+            column = self._columns.get(output) or self._elements.get(output)
+        if column is None:
+            known = ", ".join(of.name for of in self._outputs)
+            raise KeyError(f"no output {output if isinstance(output, str) else key!r} was requested; there are {known}")
+        if measure and column.first is None:
+            raise KeyError(f"{output} has no measures; only numbers up to 2**53 have")
         if not measure and not self._trajectories.shape[2]:
             raise KeyError(f"{key}: no trajectories were kept; request them with every=1, or read [output, measure]")
         if measure and measure[0] not in self._measures:
             known = ", ".join(self._measures) or "none"
             raise KeyError(f"no measure {measure[0]!r} was requested; there are {known}")
-        results, shape = self._trajectories, self._shape(output)
-        first = self._columns[output]
+        if column.first is None:
+            assert column.exact is not None
+            return column.exact
+        results, first = self._trajectories, column.first
         if measure and self._measured is not None:
             results = self._measured[:, :, self._measures.index(measure[0]), None]
         found: _Array = results[:, first]
-        if shape:
-            columns = results[:, first : first + len(self._elements(output))].swapaxes(1, 2)
-            found = columns.reshape(*columns.shape[:2], *shape)
+        if column.shape:
+            columns = results[:, first : first + len(column.elements)].swapaxes(1, 2)
+            found = columns.reshape(*columns.shape[:2], *column.shape)
         if measure:
             found = found[:, 0]
         self._announce(key, found)
@@ -207,10 +213,10 @@ class Runs(Mapping[str, _Array]):
             warnings.warn(line, RuntimeWarning, stacklevel=3)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(self._outputs) if self._trajectories.shape[2] else ())
+        return iter(dict.fromkeys(column.name for column in self._outputs) if self._trajectories.shape[2] else ())
 
     def __len__(self) -> int:
-        return len(set(self._outputs)) if self._trajectories.shape[2] else 0
+        return sum(1 for _ in iter(self))
 
     def __bool__(self) -> bool:
         return True
@@ -220,73 +226,65 @@ class Runs(Mapping[str, _Array]):
         each run.
 
         The columns are start values and outputs, by name, and measures, such as `roll_peak`. Start values and measures are repeated in
-        all rows of a run. A start value of an output is called `roll at start`. Raises ImportError without pandas.
+        all rows of a run. A start value of an output is called `roll at start`. Raises ImportError without pandas, and ValueError if two
+        different columns would have the same name.
         """
         pandas = _needed("pandas")
         runs = np.arange(self.count)
         index, repeat = pandas.Index(runs, name="run"), 1
         if len(self):
             index, repeat = pandas.MultiIndex.from_product([runs, self.time], names=["run", "time"]), len(self.time)
-        by_run = {**self._starts(), **self._by_name()}
-        columns = {
-            element: values if isinstance(values, str) else np.repeat(values, repeat)
-            for name, value in by_run.items()
-            for element, values in self._split(name, value, 1)
-        }
+        table = _Table()
+        for name, value in self.start.items():
+            ending = AT_START if name in [*self] else ""
+            if isinstance(value, str | bytes):
+                table.add(f"{name}{ending}", ("start", name), value)
+                continue
+            for element, values in _split(self._arrays[name][1] if name in self._arrays else [name], value, 1):
+                table.add(f"{element}{ending}", ("start", element), np.repeat(values, repeat))
+        for column, measure in self._measured_columns():
+            for element, values in _split(column.elements, self[column.name, measure], 1):
+                table.add(f"{element}_{measure}", ("measure", element, measure), np.repeat(values, repeat))
         for name, series in self.items():
-            columns |= {element: values.ravel() for element, values in self._split(name, series, 2)}
-        return pandas.DataFrame(columns, index=index)
+            for element, values in _split(self._columns[name].elements, series, 2):
+                table.add(element, ("output", element), values.ravel())
+        return pandas.DataFrame(table.columns, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return a dataset of outputs with the dimensions run and time, and of measures, such as `roll_peak`, with the dimension run. Start
         values are coordinates of run; a start value of an output is called `roll at start`. The dimensions of an array T are called
-        `T_0`, `T_1` and so on. Raises ImportError without xarray."""
+        `T_0`, `T_1` and so on. Raises ImportError without xarray, and ValueError if two different variables would have the same name."""
         needed = _needed("xarray")
 
-        def dims(name: str, *first: str) -> tuple[str, ...]:
-            return (*first, *(f"{name}_{number}" for number in range(len(self._shape(name)))))
+        def dims(name: str, shape: tuple[int, ...], *first: str) -> tuple[str, ...]:
+            return (*first, *(f"{name}_{number}" for number in range(len(shape))))
 
-        starts = {
-            name: value if isinstance(value, str) else (dims(name.removesuffix(AT_START), "run"), value)
-            for name, value in self._starts().items()
-        }
-        measures = {
-            f"{output}_{measure}": (dims(output, "run"), self[output, measure])
-            for output in self._numbers
-            for measure in self._measures
-        }
-        times = {"time": self.time} if len(self) else {}
-        series = {name: (dims(name, "run", "time"), series) for name, series in self.items()}
-        dataset: xarray.Dataset = needed.Dataset(
-            {**series, **measures}, {"run": np.arange(self.count), **times, **starts}
-        )
+        table = _Table()
+        table.add("run", "the runs", np.arange(self.count))
+        if len(self):
+            table.add("time", "the times", self.time)
+        for name, value in self.start.items():
+            given = value if isinstance(value, str | bytes) else (dims(name, value.shape[1:], "run"), value)
+            table.add(f"{name}{AT_START}" if name in [*self] else name, ("start", name), given)
+        coordinates = dict(table.columns)
+        for name, series in self.items():
+            table.add(name, ("output", name), (dims(name, self._columns[name].shape, "run", "time"), series))
+        for column, measure in self._measured_columns():
+            measured = (dims(column.name, column.shape, "run"), self[column.name, measure])
+            table.add(f"{column.name}_{measure}", ("measure", column.name, measure), measured)
+        variables = {name: values for name, values in table.columns.items() if name not in coordinates}
+        dataset: xarray.Dataset = needed.Dataset(variables, coordinates)
         return dataset
 
-    def _starts(self) -> dict[str, Any]:
-        return {f"{name}{AT_START}" if name in self else name: value for name, value in self.start.items()}
-
-    def _by_name(self) -> dict[str, _Array]:
-        found: dict[str, _Array] = {}
-        for output in self._numbers:
-            for measure in self._measures:
-                of_elements = self._split(output, self[output, measure], 1)
-                found |= {f"{element}_{measure}": values for element, values in of_elements}
-        return found
-
-    def _split(self, name: str, values: _Array | str, ahead: int) -> list[tuple[str, Any]]:
-        """Split an array into pairs of the name of an element and its values, which keep the first `ahead` dimensions. Other values are one
-        pair."""
-        array = name.removesuffix(AT_START)
-        if array not in self._arrays or isinstance(values, str):
-            return [(name, values)]
-        columns = values.reshape(*values.shape[:ahead], -1)
-        ending = name[len(array) :]
-        return [(f"{element}{ending}", columns[..., k]) for k, element in enumerate(self._elements(array))]
+    def _measured_columns(self) -> list[tuple[_Column, str]]:
+        numbers = [column for column in self._outputs if column.first is not None]
+        return [(column, measure) for column in numbers for measure in self._measures]
 
     def __repr__(self) -> str:
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""
         failed = f", {len(self._errors)} failed" if self._errors else ""
-        return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
+        outputs = ", ".join(column.name for column in self._outputs)
+        return f"<Runs: {self.count} of {outputs}, {len(self.time)} times{measures}{failed}>"
 
 
 class Interrupted(KeyboardInterrupt):
@@ -301,6 +299,25 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, runs: Runs):
         super().__init__()
         self.runs = runs
+
+
+class _Table:
+    """Columns by name, each with what it is."""
+
+    def __init__(self) -> None:
+        self.columns: dict[str, Any] = {}
+        self._meanings: dict[str, object] = {}
+
+    def add(self, name: str, meaning: object, values: Any) -> None:
+        if self._meanings.setdefault(name, meaning) != meaning:
+            raise ValueError(f"two different columns would be called {name!r}; read them from the Runs")
+        self.columns[name] = values
+
+
+def _split(elements: Sequence[str], values: _Array, ahead: int) -> list[tuple[str, _Array]]:
+    """Return the name of each element with its values, which keep the first `ahead` dimensions."""
+    columns = values.reshape(*values.shape[:ahead], -1)
+    return [(element, columns[..., k]) for k, element in enumerate(elements)]
 
 
 def _column(values: Any) -> NDArray[Any]:

@@ -85,7 +85,7 @@ impl Exact {
 
     /// Appends a value or a sequence, which is nested in `depth` sequences.
     fn add(&mut self, name: &str, given: &Bound<'_, PyAny>, depth: usize) -> PyResult<()> {
-        if let Some(value) = value_of(given) {
+        if let Some(value) = value_of(name, given) {
             if depth != self.shape.len() && !self.values.is_empty() {
                 return Err(ragged(name));
             }
@@ -94,7 +94,7 @@ impl Exact {
         }
         // Converts arrays of NumPy to lists.
         let list = given.call_method0("tolist").unwrap_or_else(|_| given.clone());
-        if let Some(value) = value_of(&list) {
+        if let Some(value) = value_of(name, &list) {
             self.values.push(value?);
             return Ok(());
         }
@@ -116,12 +116,13 @@ fn ragged(name: &str) -> PyErr {
 }
 
 /// Returns a single value; `None` for anything else.
-fn value_of(given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
+fn value_of(name: &str, given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
     if given.is_instance_of::<PyBool>() {
         return Some(given.extract().map(Value::Boolean));
     }
     if given.is_instance_of::<PyInt>() {
-        return Some(integer(given));
+        let integer = given.extract().map(Value::Integer);
+        return Some(integer.map_err(|_| wrong(name, "an integer of at most 64 bits", given)));
     }
     if given.is_instance_of::<PyFloat>() {
         return Some(given.extract().map(Value::Real));
@@ -133,17 +134,6 @@ fn value_of(given: &Bound<'_, PyAny>) -> Option<PyResult<Value>> {
         return Some(given.extract().map(Value::Binary));
     }
     None
-}
-
-/// Returns an integer. An integer that fits neither i64 nor u64 is replaced by the smallest or largest i128, which is rejected
-/// later as out of range.
-fn integer(given: &Bound<'_, PyAny>) -> PyResult<Value> {
-    let small = given.extract::<i64>().map(i128::from);
-    let large = || given.extract::<u64>().map(i128::from);
-    match small.or_else(|_| large()) {
-        Ok(integer) => Ok(Value::Integer(integer)),
-        Err(_) => Ok(Value::Integer(if given.lt(0)? { i128::MIN } else { i128::MAX })),
-    }
 }
 
 /// Converts a value to a Python object. Returns Python's None if there is no value.
@@ -167,7 +157,7 @@ fn object<'py>(py: Python<'py>, value: Option<&Value>) -> PyResult<Bound<'py, Py
 pub fn array<'py>(
     py: Python<'py>,
     base: BaseType,
-    values: &[Option<Value>],
+    values: &[Option<&Value>],
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyAny>> {
     let kind = match base {
@@ -175,7 +165,7 @@ pub fn array<'py>(
         BaseType::UInt64 if values.iter().all(Option::is_some) => "uint64",
         _ => "object",
     };
-    let objects = values.iter().map(|value| object(py, value.as_ref())).collect::<PyResult<Vec<_>>>()?;
+    let objects = values.iter().map(|value| object(py, *value)).collect::<PyResult<Vec<_>>>()?;
     let numpy = py.import("numpy")?;
     // Fills the array item by item, because NumPy would convert a list of strings or bytes to strings of fixed length.
     let array = numpy.call_method1("empty", (objects.len(), kind))?;

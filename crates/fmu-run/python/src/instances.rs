@@ -236,6 +236,7 @@ impl Instances {
     ) -> PyResult<Bound<'py, PyAny>> {
         if let (Some((name, base)), None) = (self.exact(variables)?, &out) {
             let values = self.attempt(py, |all| all.values(&name))?;
+            let values: Vec<_> = values.iter().map(Option::as_ref).collect();
             return exact::array(py, base, &values, &[self.count]);
         }
         let named = self.named("variables", variables)?;
@@ -507,10 +508,9 @@ impl Instances {
         });
         let selection = self.system.select(&elements.collect::<Vec<_>>()).map_err(python)?;
         let is_one = variables.is_instance_of::<PyString>();
-        let row = match self.system.array(&given.concat()).filter(|_| is_one) {
-            Some(array) => array.sizes.clone(),
-            None if is_one => Vec::new(),
-            None => vec![selection.len()],
+        let row = match &*given {
+            [name] if is_one => self.system.array(name).map_or_else(Vec::new, |array| array.sizes.clone()),
+            _ => vec![selection.len()],
         };
         let named = Arc::new(Named { selection, row });
         // Only str and tuple are cached, because a list may change later.

@@ -9,7 +9,7 @@ mod signals;
 mod start;
 
 use buffers::{Numbers, Output};
-use fmu_run::{Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, System, Watch};
+use fmu_run::{Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, Size, System, Watch};
 use log::Log;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
@@ -54,19 +54,21 @@ type Pairs = Vec<(String, String)>;
 type Stages = Vec<Pairs>;
 /// Messages by index of the run.
 type Messages = Vec<(usize, String)>;
-/// Stored times; names of outputs; trajectories, (runs, outputs, times); names and values of statistics, (runs, outputs, statistics);
-/// errors; notes; start values; shapes and element names of whole arrays; values that float64 cannot represent, (runs, times) by
-/// output; events, each with run, time, and outputs before and after; the exception that has stopped the runs.
+/// An output: name; shape and element names of a whole array; its first column in trajectories, statistics and events, or, for values that
+/// float64 cannot represent, the values, (runs, times, ...).
+type Column<'py> = (String, Bound<'py, PyTuple>, Vec<String>, Option<usize>, Option<Bound<'py, PyAny>>);
+/// Stored times; outputs; trajectories, (runs, columns, times); names and values of statistics, (runs, columns, statistics); errors; notes;
+/// start values; shapes and element names of the whole arrays among the start values; events, each with run, time, and columns before and
+/// after; the exception that has stopped the runs.
 type Results<'py> = (
     Bound<'py, PyAny>,
-    Vec<String>,
+    Vec<Column<'py>>,
     Bound<'py, PyAny>,
     Vec<String>,
     Option<Bound<'py, PyAny>>,
     Messages,
     Messages,
     Bound<'py, PyDict>,
-    Option<Bound<'py, PyDict>>,
     Bound<'py, PyDict>,
     Vec<(usize, f64, Vec<f64>, Vec<f64>)>,
     Option<PyErr>,
@@ -281,7 +283,7 @@ impl Loaded {
         let input_derivatives = given("input_derivatives", input_derivatives.as_ref(), true)?;
         let every = arguments::count("every", every.as_ref())?;
         arguments::callable("progress", progress.as_ref())?;
-        let arrays = Arrays::of(&model, outputs.iter().map(String::as_str).chain(start.names()));
+        let arrays = Arrays::of(&model, outputs.iter().map(String::as_str));
         let parsed = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
         let batch = Batch {
             time: time.values(),
@@ -300,6 +302,7 @@ impl Loaded {
             events: arguments::flag("events", &events)?,
         };
         let planned = model.plan(&batch).map_err(python)?;
+        let columns = arrays.columns(&outputs, planned.columns())?;
         let size = planned.size();
         if size.trajectories().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
@@ -318,43 +321,46 @@ impl Loaded {
         let results = [kept.values(), measured_values];
         let (Finished { errors, notes, exact, events }, raised) =
             perform(py, &planned, results, progress.map(Bound::unbind), log)?;
-        let exact = exact_outputs(py, &model, &planned, &exact)?;
+        let columns = columns.iter().map(|of| of.with_values(py, size, &exact)).collect::<PyResult<_>>()?;
         let measured = measured.map(|(array, _)| array);
-        let (start, arrays) = (start.dict(py)?, arrays.dict(py)?);
+        let (arrays, start) = (Arrays::of(&model, start.names()).dict(py)?, start.dict(py)?);
         let events =
             events.into_iter().map(|event| (event.run, event.time, event.before, event.after)).collect();
-        Ok((
-            times,
-            outputs,
-            trajectories,
-            measures,
-            measured,
-            errors,
-            notes,
-            start,
-            arrays,
-            exact,
-            events,
-            raised,
-        ))
+        Ok((times, columns, trajectories, measures, measured, errors, notes, start, arrays, events, raised))
     }
 }
 
-/// Returns the values that float64 cannot represent, (runs, times) by output.
-fn exact_outputs<'py>(
-    py: Python<'py>,
-    system: &System,
-    planned: &Planned,
-    all: &[Option<fmu_run::Value>],
-) -> PyResult<Bound<'py, PyDict>> {
-    let (dict, size) = (PyDict::new(py), planned.size());
-    for (output, name) in planned.exact_outputs().enumerate() {
-        let Some(base) = exact::exact_type(system, name)? else { continue };
-        let of_run = |run: usize| &all[(run * size.exact + output) * size.kept..][..size.kept];
-        let values: Vec<_> = (0..size.runs).flat_map(of_run).cloned().collect();
-        dict.set_item(name, exact::array(py, base, &values, &[size.runs, size.kept])?)?;
+/// The columns of an output, which are consecutive.
+struct Columns<'a> {
+    name: &'a str,
+    sizes: &'a [usize],
+    elements: &'a [String],
+    first: fmu_run::Column,
+}
+
+impl Columns<'_> {
+    /// Returns the output with its values if float64 cannot represent them. `all` are the values of all such outputs.
+    fn with_values<'py>(
+        &self,
+        py: Python<'py>,
+        size: Size,
+        all: &[Option<fmu_run::Value>],
+    ) -> PyResult<Column<'py>> {
+        let (first, values) = match self.first {
+            fmu_run::Column::Number(first) => (Some(first), None),
+            fmu_run::Column::Exact(first, base) => {
+                let [runs, kept] = [size.runs, size.kept];
+                let indices = (0..runs).flat_map(|run| (0..kept).map(move |time| (run, time)));
+                let values = indices.flat_map(|(run, time)| {
+                    (first..first + self.elements.len())
+                        .map(move |column| all[(run * size.exact + column) * kept + time].as_ref())
+                });
+                let shape = [&[runs, kept], self.sizes].concat();
+                (None, Some(exact::array(py, base, &values.collect::<Vec<_>>(), &shape)?))
+            }
+        };
+        Ok((self.name.to_owned(), PyTuple::new(py, self.sizes)?, self.elements.to_vec(), first, values))
     }
-    Ok(dict)
 }
 
 /// The names that denote whole arrays, with the elements of the arrays.
@@ -375,16 +381,40 @@ impl<'a> Arrays<'a> {
         names.iter().flat_map(elements).map(String::as_str).collect()
     }
 
-    /// Returns a dict with the shape and the element names of each array; `None` if there are no arrays.
-    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        if self.0.is_empty() {
-            return Ok(None);
-        }
+    /// Assigns columns to outputs. `all` has a column for each variable, in the order of `elements`. Fails for an array whose elements
+    /// have values of different types.
+    fn columns<'n>(&'n self, names: &'n [String], all: &[fmu_run::Column]) -> PyResult<Vec<Columns<'n>>> {
+        let mut rest = all;
+        let columns = names.iter().map(|name| {
+            let (sizes, elements) = match self.0.get(name.as_str()) {
+                None => (&[][..], std::slice::from_ref(name)),
+                Some(array) => (&*array.sizes, &*array.names),
+            };
+            let (own, after) = rest.split_at(elements.len());
+            rest = after;
+            let kind = |column: &fmu_run::Column| match column {
+                fmu_run::Column::Number(_) => None,
+                fmu_run::Column::Exact(_, base) => Some(*base),
+            };
+            if own.iter().any(|column| kind(column) != kind(&own[0])) {
+                let why = format!(
+                    "the elements of {name} have different types; request them by their names, such as {}",
+                    elements[0]
+                );
+                return Err(PyValueError::new_err(why));
+            }
+            Ok(Columns { name, sizes, elements, first: own[0] })
+        });
+        columns.collect()
+    }
+
+    /// Returns a dict with the shape and the element names of each array.
+    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         for (name, array) in &self.0 {
             dict.set_item(*name, (PyTuple::new(py, &array.sizes)?, &array.names))?;
         }
-        Ok(Some(dict))
+        Ok(dict)
     }
 }
 
@@ -427,14 +457,19 @@ fn perform(
     let log = log.map(Arc::new);
     let receiver = log.clone();
     let mut watch = Watch::pulsing(move |watch| {
-        let reported = Python::attach(|py| {
+        let reported = Python::try_attach(|py| {
             py.check_signals()?;
             receiver.as_ref().map_or(Ok(()), |log| log.pass(py, watch.take_messages()))?;
             progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (watch.done(), runs)).map(drop))
         });
-        if let Err(reason) = reported {
-            watch.cancel();
-            error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
+        match reported {
+            Some(Ok(())) => {}
+            // Python ends, and with it this daemon thread.
+            None => watch.cancel(),
+            Some(Err(reason)) => {
+                watch.cancel();
+                error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
+            }
         }
     });
     if log.is_some() {

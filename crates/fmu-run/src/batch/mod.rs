@@ -22,7 +22,7 @@ use crate::error::Error;
 use crate::instance::Tolerance;
 use crate::start::Start;
 use crate::system::System;
-use fmi_abi::{Interface, Value};
+use fmi_abi::{BaseType, Interface, Value};
 
 /// Specification of one or several runs. If an input or a start value has a separate value or time series for each run, the number
 /// of these determines the number of runs; otherwise there is one run.
@@ -148,6 +148,15 @@ impl Size {
     }
 }
 
+/// Where the values of an output are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// Index of the output in [`Runs::trajectories`] and [`Runs::measures`].
+    Number(usize),
+    /// Index of the output in [`Runs::exact`], and its type.
+    Exact(usize, BaseType),
+}
+
 /// Results of a [`Batch`].
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
@@ -247,9 +256,9 @@ impl Planned<'_> {
         }
     }
 
-    /// Returns the names of the outputs whose values are in [`Runs::exact`], in their order.
-    pub fn exact_outputs(&self) -> impl Iterator<Item = &str> {
-        self.plan.exact_outputs.iter().map(|(name, _)| name.as_str())
+    /// Returns where the values of each output are, in the order of [`Batch::outputs`].
+    pub fn columns(&self) -> &[Column] {
+        &self.plan.columns
     }
 
     /// Performs the runs. Writes trajectories and statistics to the caller's memory, in the layout of [`Runs`], and returns the other

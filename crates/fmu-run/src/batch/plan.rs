@@ -3,7 +3,7 @@
 use super::exact::Input;
 use super::inputs::{Inputs, checked, each_input, is_held, once};
 use super::model_exchange_plan::ModelExchangePlan;
-use super::{Batch, Measure, Trajectory};
+use super::{Batch, Column, Measure, Trajectory};
 use crate::continuous::Integration;
 use crate::error::{Error, request};
 use crate::instance::{Tolerance, check_equal_step};
@@ -24,7 +24,9 @@ pub(super) struct Plan<'a> {
     pub exact_inputs: Vec<Input>,
     pub outputs: Selection,
     /// Outputs whose values `f64` cannot represent.
-    pub exact_outputs: Vec<(String, Target)>,
+    pub exact_outputs: Vec<Target>,
+    /// Where the values of each output are.
+    pub columns: Vec<Column>,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
     pub threads: usize,
@@ -53,6 +55,7 @@ impl<'a> Plan<'a> {
             exact_inputs: Vec::new(),
             outputs: Selection::default(),
             exact_outputs: Vec::new(),
+            columns: Vec::new(),
             every: batch.every,
             measures: &batch.measures,
             threads: system.threads(interface, batch.threads, runs)?,
@@ -68,9 +71,12 @@ impl<'a> Plan<'a> {
         }
         for name in &batch.outputs {
             let found = system.find(name)?;
-            if is_exact(found[0].variable.base) {
-                plan.exact_outputs.push(((*name).to_owned(), Target::of(found[0])));
+            let base = found[0].variable.base;
+            if is_exact(base) {
+                plan.columns.push(Column::Exact(plan.exact_outputs.len(), base));
+                plan.exact_outputs.push(Target::of(found[0]));
             } else {
+                plan.columns.push(Column::Number(plan.outputs.len()));
                 plan.outputs.push(name, &found);
             }
         }

@@ -37,6 +37,10 @@ pub(super) fn run(
         (plan.outputs.len() * plan.stored_times(), plan.outputs.len() * plan.measures.len());
     let fits = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
     assert!(fits, "there is too little memory for {} runs", plan.runs);
+    let exact = plan.exact_outputs.len().checked_mul(plan.stored_times());
+    let exact = exact.and_then(|each| each.checked_mul(plan.runs)).ok_or_else(Error::too_much)?;
+    // The memory is freed immediately, because this only tests whether so much is available.
+    Vec::<Option<Value>>::new().try_reserve_exact(exact).map_err(|_| Error::too_much())?;
     let rows = split(trajectories, trajectory).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (trajectories, measures))| Row { run, trajectories, measures }));

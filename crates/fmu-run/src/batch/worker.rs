@@ -298,7 +298,7 @@ impl<'a> Worker<'a> {
             for (output, value) in self.row.iter().enumerate() {
                 trajectories[output * kept.length + kept.index] = *value;
             }
-            for (_, target) in &plan.exact_outputs {
+            for target in &plan.exact_outputs {
                 self.exact_of_run.push(instance.get_value(*target)?);
             }
             (kept.index, kept.wait) = (kept.index + 1, plan.every.unwrap_or(1));
