@@ -56,6 +56,7 @@ def fmu(testbed):
         ({"time": [[0.0, 1.0]]}, "time must have one dimension"),
         ({"time": [0.0, 0.1, np.nan]}, "time[2] is NaN; times must be finite"),
         ({"time": [0.0, 0.2, 0.2]}, "time[2] is 0.2, which is not after time[1], 0.2"),
+        ({"time": [0.0, 3.41e-200, -5e-324]}, "time[2] is -5e-324, which is not after time[1], 3.41e-200"),
     ],
 )
 def test_invalid_arguments(fmu, arguments, message):
@@ -261,6 +262,20 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
         assert finished.any() == short and not finished.all()
         print("interrupted", flush=True)
 """
+
+
+DAEMON_SCRIPT = """
+import sys, threading, time, numpy as np, fmu_run
+fmu = fmu_run.Fmu(sys.argv[1])
+run = lambda: fmu.run(np.arange(100_000_000) * 1e-3, outputs=["roll"], measures=["peak"])
+threading.Thread(target=run, daemon=True).start()
+time.sleep(0.5)
+"""
+
+
+def test_a_daemon_thread_ends_with_python(testbed):
+    done = subprocess.run([sys.executable, "-c", DAEMON_SCRIPT, testbed], capture_output=True, text=True, timeout=20)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 @pytest.mark.parametrize("times", [10_000, 100_000_000], ids=["short runs", "in a run"])

@@ -230,7 +230,7 @@ class Model:
             events,
             reuse,
         )
-        self._warn_of_unused(inputs or {}, start or {}, interface or "co-simulation")
+        self._warn_of_unused(_items("inputs", inputs), _items("start", start), interface or "co-simulation")
         runs, raised = Runs(*found[:-1]), found[-1]
         if isinstance(raised, KeyboardInterrupt):
             raise Interrupted(runs) from None
@@ -300,7 +300,7 @@ class Model:
         >>> found["y", "k"], found.errors["y", "k"]
         """
         names = [parameters] if isinstance(parameters, str) else list(dict.fromkeys(parameters))
-        given, values = dict(start or {}), {}
+        given, values = _items("start", start), {}
         for name in names:
             if name not in self.variables:
                 raise ValueError(f"parameters: the FMU has no variable {name!r}")
@@ -398,3 +398,11 @@ class Model:
             If the FMU does not have this interface type, or if all instances fail.
         """
         return Instances(self._loaded, count, interface, start, start_time, stop_time, threads, tolerance, log)
+
+
+def _items(argument: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a mapping as a dict. Objects of pandas, such as a DataFrame with a column for each input, are accepted, too."""
+    try:
+        return {} if given is None else dict(given.items())
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError(f"{argument} must be a dict of values by name, it is {given!r}") from None

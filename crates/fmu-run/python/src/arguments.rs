@@ -149,10 +149,21 @@ pub fn in_own_unit<'py>(
     if is_difference { numbers.div(factor) } else { numbers.sub(offset)?.div(factor) }
 }
 
-/// Returns factor and offset of the conversion from the unit of a variable, or of the elements of an array, to another unit.
+/// Returns factor and offset of the conversion from the unit of a variable, or of the elements of an array, to another unit. Fails if the
+/// elements have different units.
 pub fn display_unit(system: &System, name: &str, unit: &str) -> PyResult<(f64, f64)> {
-    let variable = system.array(name).and_then(|array| array.names.first()).map_or(name, String::as_str);
-    system.display_unit(variable, unit).map_err(crate::python)
+    let of = |name: &str| system.display_unit(name, unit).map_err(crate::python);
+    let Some(array) = system.array(name) else { return of(name) };
+    let mut all = array.names.iter().map(|element| of(element));
+    let first = all.next().unwrap_or_else(|| of(name))?;
+    for other in all {
+        if other? != first {
+            return Err(PyValueError::new_err(format!(
+                "the elements of {name} have different units, so its values cannot be in {unit}; give each element"
+            )));
+        }
+    }
+    Ok(first)
 }
 
 /// Returns the path of a file.

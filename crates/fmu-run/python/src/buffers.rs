@@ -2,7 +2,7 @@
 //! caller, so these arrays are copied before and after.
 
 use pyo3::buffer::PyBuffer;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyTuple};
@@ -21,9 +21,12 @@ impl Numbers {
             return Ok(Self::One(number.value()));
         }
         check_masks(name, values)?;
-        let copy =
-            |buffer: &PyBuffer<f64>| Ok(Self::Array(buffer.to_vec(values.py())?, buffer.shape().to_vec()));
-        if let Ok(buffer) = PyBuffer::get(values) {
+        let copy = |buffer: &PyBuffer<f64>| {
+            let mut numbers = zeros(name, buffer.item_count())?;
+            buffer.copy_to_slice(values.py(), &mut numbers)?;
+            Ok(Self::Array(numbers, buffer.shape().to_vec()))
+        };
+        if let Some(buffer) = native(values) {
             return copy(&buffer);
         }
         let array = array_of(name, values)?;
@@ -47,6 +50,28 @@ impl Numbers {
             Self::Row(values) | Self::Array(values, _) => values,
         }
     }
+}
+
+/// Returns the buffer of an object whose values are float64 in the byte order of this machine.
+fn native(values: &Bound<'_, PyAny>) -> Option<PyBuffer<f64>> {
+    const OTHER: &[u8] = if cfg!(target_endian = "little") { b">!" } else { b"<" };
+    // PyO3 also accepts the other byte order.
+    let is_native = |buffer: &PyBuffer<f64>| {
+        !buffer.format().to_bytes().first().is_some_and(|order| OTHER.contains(order))
+    };
+    PyBuffer::get(values).ok().filter(is_native)
+}
+
+/// Allocates zeros. If memory does not suffice, the error names the argument.
+fn zeros(name: &str, count: usize) -> PyResult<Vec<f64>> {
+    let mut zeros = Vec::new();
+    zeros.try_reserve_exact(count).map_err(|_| {
+        PyMemoryError::new_err(format!(
+            "{name} has {count} values, for whose copy there is not enough memory"
+        ))
+    })?;
+    zeros.resize(count, 0.0);
+    Ok(zeros)
 }
 
 /// Fails for a masked array with masked values, because a conversion would return the values under the mask.
@@ -108,15 +133,16 @@ impl Output {
         };
         let wrong = || {
             PyValueError::new_err(format!(
-                "out must be a writable, contiguous array of float64 of the shape {}",
+                "out must be a writable, contiguous array of float64, in the byte order of this machine, of the shape {}",
                 self::shape(shape)
             ))
         };
-        let buffer = PyBuffer::<f64>::get(&array).map_err(|_| wrong())?;
+        let buffer = native(&array).ok_or_else(wrong)?;
         if buffer.readonly() || !buffer.is_c_contiguous() || buffer.shape() != shape {
             return Err(wrong());
         }
-        let copy = is_given.then(|| buffer.to_vec(py)).transpose()?;
+        let mut copy = is_given.then(|| zeros("out", buffer.item_count())).transpose()?;
+        copy.as_mut().map_or(Ok(()), |copy| buffer.copy_to_slice(py, copy))?;
         Ok((array, Self(buffer, copy)))
     }
 

@@ -6,7 +6,7 @@ use crate::exact::{Exact, Values, exact_type};
 use fmu_run::{Elements, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::PyDict;
 
 /// Start values by name. A variable has a number, a string, bytes or a 64-bit integer, or a sequence of them, one for each run or
 /// instance. A whole array has one value for all elements, an array, or an array for each run or instance.
@@ -136,10 +136,14 @@ fn start(values: &Values) -> fmu_run::Start<'_> {
 
 /// Converts the start value of a variable that is a number. Strings are Booleans and items of enumerations.
 fn values_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Values> {
-    if value.is_instance_of::<PyString>() || value.extract::<Vec<String>>().is_ok() {
-        return Ok(Values::Exact(Exact::of(name, value)?));
-    }
-    let numbers = Numbers::of(name, value)?;
+    let numbers = match Numbers::of(name, value) {
+        Ok(numbers) => numbers,
+        Err(error) if !error.is_instance_of::<PyValueError>(value.py()) => return Err(error),
+        Err(error) => {
+            let text = Exact::of(name, value).ok().filter(Exact::is_text);
+            return text.map(Values::Exact).ok_or(error);
+        }
+    };
     match numbers.shape() {
         [] | [_] => Ok(Values::Numbers(numbers)),
         given => Err(PyValueError::new_err(format!(
