@@ -247,7 +247,7 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
     waiting = True
 
     def report(done, runs):
-        """Prints a line when runs are in progress: short ones when some have ended."""
+        # Prints a line when runs are in progress: short ones when some have ended.
         global waiting
         if waiting and (done > 0 or not short):
             waiting = False
