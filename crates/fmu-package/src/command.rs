@@ -6,7 +6,7 @@ use crate::checker::{Check, passed_checker};
 use crate::connectors::{Terminal, terminals};
 use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::describe::{Changes, describe};
-use crate::library::{Library, check_platform, needed_glibc, stamp, with_stamp};
+use crate::library::{Library, check_platform, stamp, with_stamp};
 use crate::model::LoadedModel;
 use crate::options::BuildOptions;
 use crate::pack::{Files, Packed, Parts, pack};
@@ -21,6 +21,7 @@ use crate::universal::join_for_macos;
 use anyhow::{Context, Error, Result, bail, ensure};
 use clap::FromArgMatches;
 use fmi_abi::Standard;
+use fmi_abi::files::binaries::Binary;
 use fmi_abi::stamp::NO_GUID;
 use fmi_abi::write::write_atomically;
 use std::ffi::OsString;
@@ -217,7 +218,7 @@ impl Builder {
     fn warn_of_glibc(&self, options: &BuildOptions, libraries: &[Library]) {
         // A library with additional cargo settings is only for development on this machine.
         let is_shipped = self.settings.is_empty() && options.target.is_empty() && options.binary.is_empty();
-        let needed = |library: &Library| needed_glibc(&library.bytes);
+        let needed = |library: &Library| Binary::all(&library.bytes).ok()?.first()?.needed_glibc();
         if let Some((major, minor)) = libraries.first().filter(|_| is_shipped).and_then(needed)
             && format!("{major}.{minor}") != GLIBC
         {

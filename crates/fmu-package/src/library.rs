@@ -1,11 +1,10 @@
-//! A compiled library: its platforms, its stamp, and the version of glibc that it needs.
+//! A compiled library: its platforms and its stamp.
 
 use crate::platform::Platform;
 use crate::signature::sign;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
+use fmi_abi::files::binaries::Binary;
 use fmi_abi::stamp::{NO_GUID, Stamp};
-use object::read::macho::{FatArch, MachOFatFile32};
-use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
@@ -113,39 +112,14 @@ pub fn with_stamp(library: &[u8], guid: &str, starts: Option<&[(u32, f64)]>) -> 
 /// Returns the platforms of a library: one, or several if it is a universal library for macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
     const NONE: &str = "it is not a shared library";
-    match FileKind::parse(library).context(NONE)? {
-        FileKind::MachOFat32 => {
-            let parts = MachOFatFile32::parse(library).context(NONE)?;
-            parts.arches().iter().map(|part| platform(part.architecture(), BinaryFormat::MachO)).collect()
-        }
-        FileKind::Elf32
-        | FileKind::Elf64
-        | FileKind::MachO32
-        | FileKind::MachO64
-        | FileKind::Pe32
-        | FileKind::Pe64 => {
-            let file = File::parse(library).context(NONE)?;
-            ensure!(file.kind() == ObjectKind::Dynamic, NONE);
-            Ok(vec![platform(file.architecture(), file.format())?])
-        }
-        _ => bail!(NONE),
-    }
-}
-
-fn platform(architecture: Architecture, format: BinaryFormat) -> Result<Platform> {
-    let architecture = match architecture {
-        Architecture::X86_64 => "x86_64",
-        Architecture::I386 => "x86",
-        Architecture::Aarch64 => "aarch64",
-        other => bail!("it is for the processor {other:?}, for which FMI 2.0 has no directory"),
+    let binaries = Binary::all(library).ok().context(NONE)?;
+    ensure!(binaries.iter().all(Binary::is_shared), NONE);
+    let platform = |binary: &Binary| {
+        let processor =
+            binary.processor.context("it is for a processor for which FMI 2.0 has no directory")?;
+        Platform::of(processor, binary.system)
     };
-    let system = match format {
-        BinaryFormat::Elf => "linux",
-        BinaryFormat::Pe => "windows",
-        BinaryFormat::MachO => "macos",
-        other => bail!("it is a file in the format {other:?}, which no importer loads"),
-    };
-    Platform::of(architecture, system)
+    binaries.iter().map(platform).collect()
 }
 
 /// Checks that a library is for this platform; with `any_processor`, only that it is for the operating system of the platform.
@@ -162,29 +136,24 @@ pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> 
     Ok(())
 }
 
-/// Returns the oldest version of glibc with which a library for Linux loads; `None` if it is not for Linux or does not use glibc.
-pub fn needed_glibc(library: &[u8]) -> Option<(u32, u32)> {
-    let file = File::parse(library).ok().filter(|file| file.format() == BinaryFormat::Elf)?;
-    let strings = file.section_by_name(".dynstr")?.data().ok()?;
-    let version = |name: &[u8]| {
-        let mut numbers = std::str::from_utf8(name).ok()?.strip_prefix("GLIBC_")?.split('.');
-        Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
-    };
-    strings.split(|byte| *byte == 0).filter_map(version).max()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{check_platform, needed_glibc};
+    use super::check_platform;
     use crate::platform::Platform;
 
-    /// Returns a universal library for macOS with empty parts.
+    /// Returns a universal library for macOS, whose parts have only a header.
     fn universal(processors: &[u32]) -> Vec<u8> {
-        let mut numbers = vec![0xcafe_babe, processors.len() as u32];
-        for &processor in processors {
-            numbers.extend([processor, 0, 0x1000, 0, 12]);
+        const HEADER: usize = 32;
+        let mut bytes = [0xcafe_babe, processors.len() as u32].map(u32::to_be_bytes).concat();
+        for (index, &processor) in processors.iter().enumerate() {
+            let position = 8 + 20 * processors.len() + HEADER * index;
+            bytes.extend([processor, 0, position as u32, HEADER as u32, 0].map(u32::to_be_bytes).concat());
         }
-        numbers.iter().flat_map(|number: &u32| number.to_be_bytes()).collect()
+        for &processor in processors {
+            // The fourth number is the kind of file, a library.
+            bytes.extend([0xfeed_facf, processor, 0, 6, 0, 0, 0, 0].map(u32::to_le_bytes).concat());
+        }
+        bytes
     }
 
     fn check(library: &[u8], directory: &str, any_processor: bool) -> Result<(), String> {
@@ -212,15 +181,6 @@ mod tests {
         for directory in ["linux64", "win64", "darwin64"].into_iter().filter(|name| *name != host) {
             assert!(check(&program, directory, false).is_err(), "{directory}");
         }
-    }
-
-    #[test]
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    fn the_glibc_of_a_program_is_found() {
-        let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
-        // The standard library of Rust needs 2.17.
-        assert!(needed_glibc(&program).is_some_and(|version| version >= (2, 17)));
-        assert_eq!(needed_glibc(b"GLIBC_2.34"), None);
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Reads untrusted files: archives of FMUs and systems, and the XML files in them. Only regular files are read, each
+//! Reads untrusted files: archives of FMUs and systems, and the XML files and libraries in them. Only regular files are read, each
 //! up to a limit.
 
-mod binaries;
+pub mod binaries;
 mod scratch;
 mod unpack;
 

@@ -3,10 +3,10 @@
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
 use anyhow::bail;
+use fmi_abi::files::binaries::Binary;
 use fmi_abi::files::{self, Entry, Limits};
 use fmi_abi::{Standard, shown};
-use object::Object as _;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::env::consts::{ARCH, OS};
 use std::path::{Path, PathBuf};
 
@@ -63,7 +63,8 @@ pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pa
     let library =
         files::find_library(directory, standard, &offer.identifier).map_err(|why| format!("it {why}"))?;
     let bytes = std::fs::read(&library).map_err(|error| error.to_string())?;
-    match object::File::parse(bytes.as_slice()).ok().and_then(|file| machine(&file)) {
+    let binaries = Binary::all(&bytes).unwrap_or_default();
+    match binaries.iter().find_map(|binary| binary.processor) {
         Some(other) if other != ARCH && OS != "macos" => {
             let path = library.strip_prefix(directory).unwrap_or(&library).display();
             Err(format!("{path} is for {other}, but this machine is {ARCH}"))
@@ -72,27 +73,11 @@ pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<Pa
     }
 }
 
-/// Returns the processor architecture of a library.
-fn machine(file: &object::File) -> Option<&'static str> {
-    Some(match file.architecture() {
-        object::Architecture::X86_64 => "x86_64",
-        object::Architecture::I386 => "x86",
-        object::Architecture::Aarch64 => "aarch64",
-        object::Architecture::Arm => "aarch32",
-        _ => return None,
-    })
-}
-
-/// Returns the names that a library exports; `None` if the library cannot be parsed.
+/// Returns the names that a library exports for this processor; `None` if they cannot be read.
 pub fn exported(library: &Path) -> Option<Vec<String>> {
     let bytes = std::fs::read(library).ok()?;
-    let file = object::File::parse(bytes.as_slice()).ok()?;
-    let exports = file.exports().ok()?;
-    let strip = |name: &[u8]| {
-        let name = String::from_utf8_lossy(name).into_owned();
-        if OS == "macos" { name.trim_start_matches('_').to_owned() } else { name }
-    };
-    Some(exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
+    let binaries = Binary::all(&bytes).ok()?;
+    binaries.iter().find(|binary| binary.processor == Some(ARCH))?.exports()
 }
 
 /// Checks the directories in `binaries/` and the libraries in them.
@@ -140,10 +125,12 @@ const SYSTEM_LIBRARIES: &str = "libc.so libm.so libdl.so libpthread.so librt.so 
 /// Checks the architecture of a library, and the libraries, symbols and glibc version that it needs.
 fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
-    let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
+    // A universal library is only for macOS.
+    let binaries = Binary::all(&bytes).unwrap_or_default();
+    let [binary] = &binaries[..] else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let Some(machine) = machine(&file) else { return };
-    // A library for macOS may be universal, and a directory with a non-standard name may have libraries for any architecture.
+    let Some(machine) = binary.processor_in_fmi3() else { return };
+    // A directory with a non-standard name may have libraries for any architecture.
     let wanted = match (platform, platform.split_once('-')) {
         ("linux64" | "win64", _) => &["x86_64", "aarch64"][..],
         ("linux32" | "win32", _) => &["x86", "aarch32"],
@@ -153,23 +140,22 @@ fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str,
     if !wanted.contains(&machine) {
         add("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
     }
-    if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {
-        check_glibc(&bytes, platform, &name, add);
+    // Systems that are some years old do not have a later glibc.
+    if let Some((major, minor)) = binary.needed_glibc().filter(|version| *version > (2, 28)) {
+        add("package.glibc", format!("binaries/{platform}/{name} needs glibc {major}.{minor}"));
     }
-    let libraries: BTreeSet<String> = file
-        .import_libraries()
-        .map(|libraries| {
-            libraries.flatten().map(|library| String::from_utf8_lossy(library.name()).into_owned()).collect()
-        })
-        .unwrap_or_default();
+    let libraries = binary.needed_libraries();
     let directory = path.parent().unwrap_or(path);
     let is_system = |library: &str| {
         let lower = library.to_lowercase();
         SYSTEM_LIBRARIES.split_whitespace().any(|known| lower.starts_with(known)) || lower.is_empty()
     };
-    let foreign: Vec<&String> =
-        libraries.iter().filter(|library| !is_system(library) && !directory.join(library).exists()).collect();
-    let unversioned = unversioned_symbols(&bytes).unwrap_or_default();
+    let foreign: Vec<&str> = libraries
+        .iter()
+        .map(String::as_str)
+        .filter(|library| !is_system(library) && !directory.join(library).exists())
+        .collect();
+    let unversioned = binary.unversioned_symbols();
     if libraries.iter().all(|library| is_system(library)) && !unversioned.is_empty() {
         let list = unversioned.join(", ");
         let observed = format!(
@@ -178,47 +164,7 @@ fn check_library(path: &Path, platform: &str, add: &mut impl FnMut(&'static str,
         add("package.symbols", observed);
     }
     if !foreign.is_empty() {
-        let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
-        add("package.needs", format!("binaries/{platform}/{name} needs {}", list.join(", ")));
-    }
-}
-
-/// Returns the undefined global symbols without a version in a 64-bit library for Linux, if other undefined symbols have a version. If the
-/// library links only to system libraries, whose symbols have versions, the linker has found these symbols in none of them. Then only the
-/// program that loads the library can provide them.
-fn unversioned_symbols(bytes: &[u8]) -> object::Result<Vec<String>> {
-    use object::read::elf::{FileHeader as _, Sym as _};
-    let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
-    let endian = header.endian()?;
-    let sections = header.sections(endian, bytes)?;
-    let symbols = sections.symbols(endian, bytes, object::elf::SHT_DYNSYM)?;
-    let Some(versions) = sections.versions(endian, bytes)? else { return Ok(Vec::new()) };
-    let (mut found, mut versioned) = (Vec::new(), false);
-    for (index, symbol) in symbols.enumerate() {
-        if !symbol.is_undefined(endian) || symbol.st_bind() != object::elf::STB_GLOBAL {
-            continue;
-        }
-        // 0 and 1 mean that the symbol has no version.
-        if versions.version_index(endian, index).index() > object::elf::VER_NDX_GLOBAL {
-            versioned = true;
-        } else {
-            found.push(String::from_utf8_lossy(symbol.name(endian, symbols.strings())?).into_owned());
-        }
-    }
-    found.retain(|name| versioned && !name.is_empty());
-    Ok(found)
-}
-
-/// Reports the version of glibc that a library needs, if it is later than 2.28, because systems that are some years old do not have it.
-fn check_glibc(bytes: &[u8], platform: &str, name: &str, add: &mut impl FnMut(&'static str, String)) {
-    let marker = b"GLIBC_2.";
-    let markers = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);
-    let minors = markers.map(|(index, _)| {
-        let digits = bytes[index + marker.len()..].iter().take_while(|byte| byte.is_ascii_digit());
-        digits.map(|byte| char::from(*byte)).collect::<String>().parse::<u32>().unwrap_or(0)
-    });
-    if let Some(minor) = minors.max().filter(|minor| *minor >= 29) {
-        add("package.glibc", format!("binaries/{platform}/{name} needs glibc 2.{minor}"));
+        add("package.needs", format!("binaries/{platform}/{name} needs {}", foreign.join(", ")));
     }
 }
 
