@@ -16,13 +16,14 @@
 //! | checks of the model | `check`, `sample` |
 //! | the description | `structure`, `definitions`, `describe` |
 //! | the FMU | `connectors`, `platform`, `signature`, `library`, `starts`, `universal`, `fingerprint`, `pack` |
-//! | the command | `cross`, `c_sources`, `cargo`, `page_html`, `page`, `terminal`, `options`, `checker`, `command` |
+//! | the command | `cross`, `c_sources`, `cargo`, `page_html`, `terminal`, `options`, `builder`, `stages/plan` |
+//! | its stages | `stages/compile`, `stages/describe`, `stages/check`, `stages/page`, `stages/pack`; `command` has their order |
 
+mod builder;
 mod c_sources;
 mod call_monitor;
 mod cargo;
 mod check;
-mod checker;
 mod command;
 mod connectors;
 mod content;
@@ -37,12 +38,12 @@ mod model;
 mod options;
 mod pack;
 mod packages;
-mod page;
 mod page_html;
 mod platform;
 mod sample;
 mod signature;
 mod sources;
+mod stages;
 mod starts;
 pub mod structure;
 mod table;
@@ -50,10 +51,10 @@ pub mod terminal;
 mod universal;
 
 pub use {
+    builder::Builder,
     c_sources::{LINKING, WEBASSEMBLY, c_sources, check_tools},
     cargo::LibraryBuild,
-    checker::pass_checker,
-    command::{Builder, build},
+    command::build,
     connectors::{Terminal, terminals},
     content::{ContentFile, content_files},
     describe::{Changes, describe},
@@ -65,7 +66,7 @@ pub use {
     options::BuildOptions,
     pack::{Files, Packed, Parts, pack},
     packages::{cargo, directory_of, metadata},
-    page::Page,
     platform::Platform,
     sources::Sources,
+    stages::{Page, pass_checker},
 };

@@ -1,8 +1,11 @@
-//! Has an FMU checked before it gets its name.
+//! Has the FMUs checked before they get their names.
 //!
 //! The checker is the program cargo-fmu, because programs that build FMUs should compile fast, and because a model may crash or never
 //! return, which must not end the build without a message.
 
+use super::Plan;
+use super::describe::Described;
+use crate::pack::{Files, Packed, Parts, pack};
 use anyhow::{Context, Result, bail};
 use std::env;
 use std::fs;
@@ -23,17 +26,59 @@ pub fn pass_checker(command: &mut Command, program: &Path) {
     command.env(PROGRAM, program);
 }
 
+/// A model without a mistake that the checker finds.
+pub(crate) struct Checked(pub Described);
+
+/// Checks the model in an FMU for this machine, and prints warnings. Without a [checker](crate::Builder::checker), returns the model
+/// unchecked.
+///
+/// # Errors
+/// When the model has a mistake, or cannot be checked.
+pub(crate) fn check(plan: &Plan, described: Described) -> Result<Checked> {
+    let Some(checker) = &plan.builder.checker else { return Ok(Checked(described)) };
+    let Described { compiled, descriptions, .. } = &described;
+    let model = &compiled.model;
+    // Both versions have the same model, so one is checked: FMI 3.0, whose description states more dependencies. If there are
+    // arrays, both are, because FMI 2.0 has their elements as variables.
+    let unchecked = if model.table.arrays { 0 } else { descriptions.len() - 1 };
+    let content = plan.content_without_page();
+    let mut printed: Vec<String> = Vec::new();
+    for (fmi, description) in &descriptions[unchecked..] {
+        let parts = Parts {
+            fmi: *fmi,
+            identifier: model.identifier(),
+            description,
+            terminals: None,
+            libraries: std::slice::from_ref(&compiled.own),
+            with_guid: &|_| Ok(Files::new()),
+            content: &content,
+        };
+        let fmu = compiled.directory.path().join(format!("{}.fmu", model.identifier()));
+        let Packed { guid, .. } = pack(&fmu, &parts)?;
+        let record = plan.target.join(format!(".{}-fmi{}-checked", model.identifier(), *fmi as u32 + 2));
+        let check = Check { checker, fmu: &fmu, guid: &guid, limit: plan.time_limit, record: &record };
+        // Usually the warnings of both versions are the same.
+        for line in check.run()?.lines() {
+            if !printed.iter().any(|before| before == line) {
+                eprintln!("{line}");
+                printed.push(line.to_owned());
+            }
+        }
+    }
+    Ok(Checked(described))
+}
+
 /// The check of an FMU that is being built.
-pub(crate) struct Check<'a> {
+struct Check<'a> {
     /// The program cargo-fmu.
-    pub checker: &'a Path,
-    pub fmu: &'a Path,
+    checker: &'a Path,
+    fmu: &'a Path,
     /// Hash of everything in the FMU.
-    pub guid: &'a str,
+    guid: &'a str,
     /// A call of the model that takes longer is an error.
-    pub limit: Duration,
+    limit: Duration,
     /// File that contains the last FMU that has passed.
-    pub record: &'a Path,
+    record: &'a Path,
 }
 
 impl Check<'_> {
@@ -42,7 +87,7 @@ impl Check<'_> {
     ///
     /// # Errors
     /// When the FMU has a mistake, or cannot be checked.
-    pub fn run(&self) -> Result<String> {
+    fn run(&self) -> Result<String> {
         let key = self.key()?;
         let record = fs::read_to_string(self.record).unwrap_or_default();
         if let Some(warnings) = record.strip_prefix(&key) {

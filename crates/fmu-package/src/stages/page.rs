@@ -1,13 +1,16 @@
-//! Compiles the model for the page that runs it in a browser.
+//! Makes the page, and compiles the model for the part of it that runs the FMU in a browser.
 
-use crate::c_sources::{LINKING, WEBASSEMBLY};
+use super::Plan;
+use super::check::Checked;
+use super::describe::Described;
+use crate::c_sources::{LINKING, WEBASSEMBLY, c_sources};
 use crate::cargo::LibraryBuild;
 use crate::content::ContentFile;
 use crate::cross::has_std;
 use crate::library::{stamp, with_stamp};
-use crate::pack::with_guid_of;
+use crate::pack::{Files, with_guid_of};
 use crate::packages::directory_of;
-use crate::page_html::{PAGE, Runnable, page};
+use crate::page_html::{self, PAGE, Runnable};
 use crate::sources::DESCRIPTION;
 use crate::table::Info;
 use anyhow::{Context, Result};
@@ -38,8 +41,58 @@ pub struct Page {
     pub companions: Vec<&'static str>,
 }
 
+/// A model with its page.
+pub(crate) struct Paged<'a> {
+    pub described: Described,
+    /// The page without the part that runs the FMU.
+    written: Option<String>,
+    compiled: Option<CompiledPage<'a>>,
+}
+
+/// Makes the page: the part that the author has written, and the model for the part that runs it.
+///
+/// # Errors
+/// When the page cannot be read or made, or a companion cannot be compiled.
+pub(crate) fn page<'a>(plan: &Plan<'a>, Checked(described): Checked) -> Result<Paged<'a>> {
+    let page = &plan.builder.page;
+    // The page runs the FMU for FMI 2.0.
+    let description = described.fmi2.as_ref().unwrap_or(&described.descriptions[0].1);
+    let written = page.written(description, &plan.content)?;
+    let compiled = match &described.fmi2 {
+        Some(description) if plan.with_page => page.compile(&plan.build(), description.clone())?,
+        _ => None,
+    };
+    Ok(Paged { written, compiled, described })
+}
+
+impl Paged<'_> {
+    /// Returns the files of the FMU that contain its guid, besides the description and the libraries: the page, and C sources.
+    ///
+    /// # Errors
+    /// When the page or the C sources cannot be made.
+    pub fn with_guid(&self, plan: &Plan, guid: &str) -> Result<Files> {
+        let compiled = &self.described.compiled;
+        let (model, starts) = (&compiled.model, &compiled.starts[..]);
+        let mut files = match (&plan.wasm2c, &compiled.module) {
+            (Some(wasm2c), Some(module)) => {
+                c_sources(wasm2c, &with_stamp(module, guid, Some(starts))?, model.identifier())?
+            }
+            _ => Files::new(),
+        };
+        files.iter_mut().for_each(|(name, _)| name.insert_str(0, "sources/"));
+        let html = match &self.compiled {
+            Some(page) => {
+                Some(page.html(self.written.as_deref(), guid, starts, &model.table.info, &plan.content)?)
+            }
+            None => self.written.clone().map(String::into_bytes),
+        };
+        files.extend(html.map(|html| (PAGE.to_owned(), html)));
+        Ok(files)
+    }
+}
+
 /// The model and its companions, compiled for a page.
-pub(crate) struct CompiledPage<'a> {
+struct CompiledPage<'a> {
     page: &'a Page,
     model: Runnable,
     companions: Vec<Runnable>,
@@ -47,7 +100,7 @@ pub(crate) struct CompiledPage<'a> {
 
 impl Page {
     /// Returns the page without the part that runs the FMU: `html`, or the page among the content.
-    pub(crate) fn written(&self, description: &str, content: &[ContentFile]) -> Result<Option<String>> {
+    fn written(&self, description: &str, content: &[ContentFile]) -> Result<Option<String>> {
         match (self.html, content.iter().find(|file| file.name == PAGE)) {
             (Some(html), _) => html(description).map(Some),
             (None, Some(ContentFile { path, .. })) => {
@@ -59,11 +112,7 @@ impl Page {
 
     /// Compiles the model and its companions for WebAssembly. If the model cannot be compiled for WebAssembly, prints a note and returns
     /// `None`.
-    pub(crate) fn compile(
-        &self,
-        build: &LibraryBuild,
-        description: String,
-    ) -> Result<Option<CompiledPage<'_>>> {
+    fn compile(&self, build: &LibraryBuild, description: String) -> Result<Option<CompiledPage<'_>>> {
         if !has_std(WEBASSEMBLY) {
             eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
             return Ok(None);
@@ -92,7 +141,7 @@ impl Page {
 impl CompiledPage<'_> {
     /// Returns the page for an FMU with this guid and these start values. Companions keep the guid of their descriptions.
     /// `written` is the page without the part that runs the FMU.
-    pub fn html(
+    fn html(
         &self,
         written: Option<&str>,
         guid: &str,
@@ -106,7 +155,7 @@ impl CompiledPage<'_> {
             module: with_stamp(module, guid, Some(starts))?,
         };
         let runnables: Vec<_> = std::iter::once(model).chain(self.companions.iter().cloned()).collect();
-        page(written, content, (&info.name, &info.description), &runnables, &self.page.scripts)
+        page_html::page(written, content, (&info.name, &info.description), &runnables, &self.page.scripts)
     }
 }
 
