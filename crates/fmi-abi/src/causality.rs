@@ -2,6 +2,42 @@
 
 use std::fmt;
 
+// The tables of section 2.2.7 of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2. The exporter and the checker call the same functions, so
+// a model that compiles has no finding.
+impl Causality {
+    /// Whether a variable of this causality may have this variability.
+    pub const fn permits(self, variability: Variability) -> bool {
+        use Causality::*;
+        use Variability::*;
+        matches!(
+            (self, variability),
+            (Parameter | StructuralParameter | CalculatedParameter, Fixed | Tunable)
+                | (Input, Discrete | Continuous)
+                | (Output, Constant | Discrete | Continuous)
+                | (Local, _)
+                | (Independent, Continuous)
+        )
+    }
+
+    /// Whether a variable of this causality and variability may have this `initial`; `None` if the attribute is missing and has no
+    /// default.
+    pub const fn permits_initial(self, variability: Variability, initial: Option<Initial>) -> bool {
+        use Causality::*;
+        use Initial::*;
+        use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+        self.permits(variability)
+            && matches!(
+                (self, variability, initial),
+                (Parameter | StructuralParameter, _, Some(Exact))
+                    | (_, Constant, Some(Exact))
+                    | (Input, _, None | Some(Exact))
+                    | (Independent, _, None)
+                    | (CalculatedParameter | Local, Fixed | Tunable, Some(Calculated | Approx))
+                    | (Output | Local, Discrete | Continuous, Some(_))
+            )
+    }
+}
+
 /// Defines an enumeration whose items have names in model descriptions.
 macro_rules! attribute {
     ($(#[$text:meta])* $name:ident { $($(#[$item_text:meta])* $item:ident = $word:literal,)+ }) => {

@@ -17,6 +17,7 @@ pub mod description;
 pub mod files;
 pub mod fmi2;
 pub mod fmi3;
+mod limits;
 mod log_category;
 mod mode;
 mod rule;
@@ -32,6 +33,7 @@ pub mod xml;
 
 pub use base_type::BaseType;
 pub use causality::{Causality, DependencyKind, Initial, Variability};
+pub use limits::{empty_range, ends_too_early};
 pub use log_category::Category;
 pub use mode::{AllowedStates, FmiState, Mode};
 pub use rule::Rule;

@@ -4,7 +4,10 @@ use crate::call_sequence::Kind;
 use crate::rules::Observation;
 use fmi_abi::description::{Fault, ModelDescription};
 pub use fmi_abi::description::{Offer, Unknown, Variable};
-use fmi_abi::{BaseType, Causality, Initial, Standard, Value, Variability, is_c_identifier, shown};
+use fmi_abi::{
+    BaseType, Causality, Initial, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
+    shown,
+};
 use std::collections::{HashMap, HashSet};
 use std::ops::Deref;
 
@@ -154,9 +157,8 @@ impl Description {
                 wrong.push(("description.structure", why));
             }
         }
-        if self.stop_time.is_some_and(|stop| stop <= self.start_time) {
-            wrong
-                .push(("description.experiment", "the default experiment stops before it starts".to_owned()));
+        if let Some(why) = self.stop_time.and_then(|stop| ends_too_early(self.start_time, stop)) {
+            wrong.push(("description.experiment", why));
         }
         wrong
     }
@@ -254,46 +256,19 @@ fn early(written: &ModelDescription) -> HashSet<Handle> {
     all.map(|index| handle(written.standard, &written.variables[index])).collect()
 }
 
-/// Causality, variabilities and values of `initial` that may be combined.
-type Combination = (Causality, &'static [Variability], &'static [Option<Initial>]);
-
-/// The tables of section 2.2.7 of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2.
-#[rustfmt::skip]
-const COMBINATIONS: &[Combination] = {
-    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter};
-    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
-    const EXACT: Option<Initial> = Some(Initial::Exact);
-    const APPROX: Option<Initial> = Some(Initial::Approx);
-    const CALCULATED: Option<Initial> = Some(Initial::Calculated);
-    &[
-        (Parameter, &[Fixed, Tunable], &[EXACT]),
-        (StructuralParameter, &[Fixed, Tunable], &[EXACT]),
-        (CalculatedParameter, &[Fixed, Tunable], &[CALCULATED, APPROX]),
-        (Input, &[Discrete, Continuous], &[None, EXACT]),
-        (Output, &[Constant], &[EXACT]),
-        (Output, &[Discrete, Continuous], &[CALCULATED, EXACT, APPROX]),
-        (Local, &[Constant], &[EXACT]),
-        (Local, &[Fixed, Tunable], &[CALCULATED, APPROX]),
-        (Local, &[Discrete, Continuous], &[CALCULATED, EXACT, APPROX]),
-        (Independent, &[Continuous], &[None]),
-    ]
-};
-
 /// Returns the rules that a single variable breaks.
 fn faults(variable: &Variable) -> Vec<Observation> {
     let (name, mut wrong) = (&variable.name, Vec::new());
     let mut add = |rule, why: String| wrong.push((rule, why));
     let Variable { causality, variability, initial, .. } = *variable;
-    let row = COMBINATIONS.iter().find(|(of, with, _)| *of == causality && with.contains(&variability));
-    match row {
-        _ if variable.base.is_none() || variable.clocked => {}
-        None => add("description.combination", format!("{name} is {causality} and {variability}")),
-        Some((.., initials)) if !initials.contains(&initial) => {
-            let initial = initial.map_or_else(String::new, |initial| initial.to_string());
-            let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
-            add("description.combination", why);
-        }
-        Some(_) => {}
+    if variable.base.is_none() || variable.clocked {
+        // Clocks and clocked variables have other rules.
+    } else if !causality.permits(variability) {
+        add("description.combination", format!("{name} is {causality} and {variability}"));
+    } else if !causality.permits_initial(variability, initial) {
+        let initial = initial.map_or_else(String::new, |initial| initial.to_string());
+        let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
+        add("description.combination", why);
     }
     if variability == Variability::Continuous && !variable.is_float() && variable.base.is_some() {
         add("description.combination", format!("{name} is continuous, but not a floating-point number"));
@@ -307,9 +282,9 @@ fn faults(variable: &Variable) -> Vec<Observation> {
         add("description.start", format!("{name} is calculated and has a start value"));
     }
     if let (Some(min), Some(max)) = (variable.min, variable.max)
-        && min > max
+        && let Some(why) = empty_range(min, max)
     {
-        add("description.range", format!("{name} has a min of {min} and a max of {max}"));
+        add("description.range", format!("the range of {name} is empty: {why}"));
     }
     let outside = |number: &f64| {
         variable.min.is_some_and(|min| *number < min) || variable.max.is_some_and(|max| *number > max)

@@ -371,32 +371,16 @@ impl<M> Variable<M> {
     pub(crate) const fn fault(&self) -> Option<&'static str> {
         use Causality::*;
         use Variability::*;
-        let legal = matches!(
-            (self.causality, self.variability),
-            (Parameter | CalculatedParameter, Fixed | Tunable)
-                | (Input, Discrete | Continuous)
-                | (Output, Constant | Discrete | Continuous)
-                | (Local, _)
-                | (Independent, Continuous)
-        );
         if self.rejected.is_some() {
             return self.rejected;
         }
         if self.description.is_empty() {
             return Some("add a description: a comment (///) above the line");
         }
-        if !legal {
+        if !self.causality.permits(self.variability) {
             return Some("this causality does not permit this variability (section 2.2.7 of FMI 2.0)");
         }
-        let legal = matches!(
-            (self.causality, self.variability, self.initial),
-            (Input | Independent, _, None)
-                | (Parameter, _, Some(Initial::Exact))
-                | (_, Constant, Some(Initial::Exact))
-                | (Output | Local, Discrete | Continuous, Some(_))
-                | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
-        );
-        if !legal {
+        if !self.causality.permits_initial(self.variability, self.initial) {
             return Some(
                 "this causality and variability do not permit this initial value (section 2.2.7 of FMI 2.0)",
             );

@@ -6,7 +6,9 @@ use crate::instance::Instance;
 use crate::model::LoadedModel;
 use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmi_abi::{BaseType, Causality, Standard, Value, Variability, is_c_identifier};
+use fmi_abi::{
+    BaseType, Causality, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
+};
 use std::collections::HashSet;
 use std::fmt::Display;
 
@@ -170,13 +172,12 @@ fn check_info(info: &Info) -> Result<()> {
             "the {name} of the default experiment must be finite and > 0, it is {value}"
         );
     }
-    ensure!(
-        info.stop_time >= info.start_time,
-        "the default experiment ends at {}, before its start at {}",
-        info.stop_time,
-        info.start_time
-    );
-    Ok(())
+    none(ends_too_early(info.start_time, info.stop_time))
+}
+
+/// Fails with the reason, if there is one.
+fn none(reason: Option<String>) -> Result<()> {
+    reason.map_or(Ok(()), |why| Err(anyhow!(why)))
 }
 
 fn check_type(variable_type: &Type) -> Result<()> {
@@ -189,17 +190,14 @@ fn check_type(variable_type: &Type) -> Result<()> {
                 ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
             }
             if let (Some(min), Some(max)) = (min, max) {
-                ensure!(min <= max, "its range is empty: min {min} is above max {max}");
+                none(empty_range(min, max)).context("its range is empty")?;
             }
             if let Some(nominal) = *nominal {
                 ensure!(is_positive(nominal), "the nominal value must be finite and > 0, it is {nominal}");
             }
             check_unit(unit)
         }
-        Attributes::Integer { min, max } => {
-            ensure!(min <= max, "its range is empty: min {min} is above max {max}");
-            Ok(())
-        }
+        Attributes::Integer { min, max } => none(empty_range(min, max)).context("its range is empty"),
         Attributes::Enumeration(items) => {
             ensure!(!variable_type.name.is_empty(), "an Enumeration needs a name (section 2.2.7 of FMI 2.0)");
             ensure!(!items.is_empty(), "it has no items");

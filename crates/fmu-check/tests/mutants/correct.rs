@@ -48,7 +48,7 @@ fn unusual_behaviour_is_accepted() {
 #[test]
 fn any_default_experiment_is_checked() {
     let directory = TempDir::new().expect("a directory");
-    for (stop, size) in [("1", "0.3"), ("1", "1"), ("1", "3"), ("0.07", "0.01"), ("1e-9", "1")] {
+    for (stop, size) in [("1", "0.3"), ("1", "1"), ("1", "3"), ("0.07", "0.01"), ("1e-9", "1"), ("0", "1")] {
         let path = fmu(directory.path(), 2, &library(&[]), |text| {
             text.replace(
                 r#"stopTime="1" stepSize="0.01""#,

@@ -250,7 +250,7 @@ fn symbol_missing() {
 
 /// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
 #[rustfmt::skip]
-const DESCRIPTIONS: [(u32, &str, &str, &str); 22] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str); 23] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
     (3, "description.combination", r#""input" variability"#, r#""input" initial="calculated" variability"#),
     (3, "description.combination", r#""output" variability="discrete""#, r#""output" variability="continuous""#),
@@ -271,6 +271,7 @@ const DESCRIPTIONS: [(u32, &str, &str, &str); 22] = [
     (3, "description.token", r#" instantiationToken="wagon""#, ""),
     (2, "description.empty-token", r#"guid="wagon""#, r#"guid="""#),
     (2, "description.range", r#"<Real start="2""#, r#"<Real min="3" start="2""#),
+    (2, "description.experiment", r#"stopTime="1""#, r#"stopTime="-1""#),
     (2, "description.types", r#"<Real start="2""#, r#"<Real declaredType="Weight" start="2""#),
     (2, "description.names", r#"name="spring""#, r#"name="mass""#),
 ];
