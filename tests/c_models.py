@@ -18,16 +18,7 @@ def library(model: str, *flags: str) -> bytes:
     """Returns the library of a model, which is compiled once for all FMUs."""
     with tempfile.TemporaryDirectory() as directory:
         to = Path(directory) / "model.so"
-        common = [
-            "-std=gnu11",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-Wno-missing-field-initializers",
-            "-O2",
-            "-shared",
-            "-fPIC",
-        ]
+        common = ["-std=gnu11", f"@{MODELS / 'compiler-options.txt'}"]
         # One of the integrator's traits is that the library uses functions of libm without being linked to it.
         libraries = ["-lpthread"] if model == "integrator" else ["-lm", "-lpthread"]
         subprocess.run(["cc", *common, *flags, MODELS / f"{model}.c", "-o", to, *libraries], check=True)

@@ -29,7 +29,7 @@ pub fn read(name: &str) -> String {
 #[must_use]
 pub fn library(model: &str, flags: &[&str]) -> PathBuf {
     let mut hasher = std::hash::DefaultHasher::new();
-    (read(&format!("{model}.c")), read("frame.h"), flags).hash(&mut hasher);
+    (read(&format!("{model}.c")), read("frame.h"), read("compiler-options.txt"), flags).hash(&mut hasher);
     let directory = std::env::current_exe().expect("a test").with_file_name("c_models");
     std::fs::create_dir_all(&directory).expect("a directory");
     let library = directory.join(format!("{model}-{:x}{DLL_SUFFIX}", hasher.finish()));
@@ -51,17 +51,8 @@ pub fn compile(model: &str, flags: &[&str], library: &Path) {
     let [language, compiler, variable] =
         if flags.contains(&"-xc++") { ["-std=gnu++20", "c++", "CXX"] } else { ["-std=gnu11", "cc", "CC"] };
     let status = Command::new(std::env::var_os(variable).unwrap_or_else(|| compiler.into()))
-        .args([
-            language,
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-Wno-missing-field-initializers",
-            "-O1",
-            "-ffp-contract=off",
-            "-shared",
-            "-fPIC",
-        ])
+        .arg(language)
+        .arg(format!("@{}", source("compiler-options.txt").display()))
         .args(flags)
         .arg(source(&format!("{model}.c")))
         .arg("-o")
