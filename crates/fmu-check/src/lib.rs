@@ -7,7 +7,7 @@
 //! twice, and written to the report with the results that show the finding (`reproduce`, `evidence`), from which `replay` executes
 //! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
-//! Each module uses only modules before it: `random`, `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `schema`,
+//! Each module uses only modules before it: `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `schema`,
 //! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `checks`,
 //! `activity`, `schedule`, `baseline`, `report`, `replay`.
 
@@ -22,7 +22,6 @@ mod evidence;
 mod finding;
 mod legal;
 mod options;
-mod random;
 mod replay;
 mod report;
 mod reproduce;

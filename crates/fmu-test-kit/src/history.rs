@@ -421,7 +421,7 @@ fn parameters_in_turn<F: Either, M: Exported>(random: &mut Random, context: &Con
 
 /// Runs one random history with the calls that this seed determines.
 fn history<F: Either, M: Exported>(seed: u64, context: &Context) {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut random = Random::mixed(seed);
     parameters_in_turn::<F, M>(&mut random, context);
     let mut all = vec![Tracked::<F, M>::new(context)];
     for _ in 0..CALLS {

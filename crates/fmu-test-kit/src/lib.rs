@@ -26,14 +26,12 @@ mod importer;
 mod instructions;
 mod library;
 pub mod models;
-mod random;
 pub mod realtime;
 pub mod serialized;
 
 pub use either::{Either, Updated, Version};
-pub use fmi_abi::calls;
+pub use fmi_abi::calls::{self, Random};
 pub use fmi2::{FUNCTIONS, Functions, Importer};
 pub use importer::{Arguments, Hook, Message};
 pub use instructions::instructions;
 pub use library::{functions_of, load};
-pub use random::Random;

@@ -6,12 +6,12 @@ use crate::call_sequence::{Arg, NULL_INSTANCE, Run, Step};
 use crate::checker::Checker;
 use crate::description::Variable;
 use crate::finding::{event, first_failure};
-use crate::random::Random;
 use crate::worker::MOST_UPDATES;
 use crate::writer::Part::{
     self, Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Save,
 };
 use crate::writer::{LONG_NAME, Point, Trajectory, Writer};
+use fmi_abi::calls::Random;
 use std::sync::Arc;
 
 /// Checks that all calls of a sequence succeed.
@@ -234,7 +234,7 @@ impl RandomCalls {
 
 /// Checks random sequences of allowed calls.
 pub fn random(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut random = Random::new(checker.seed);
+    let mut random = Random::mixed(checker.seed);
     let can_save = checker.saves(trajectory.interface);
     for _ in 0..checker.at_most(20) {
         let mut writer = checker.writer(trajectory);

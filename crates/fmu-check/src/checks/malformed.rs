@@ -4,9 +4,8 @@ use super::rejections::unknown_reference;
 use crate::call_sequence::{Arg, CallSequence, End, Kind, Values};
 use crate::checker::Checker;
 use crate::description::{kind_of, type_name};
-use crate::random::Random;
 use crate::writer::{Part, Point, Trajectory, Writer, access};
-use fmi_abi::calls::{Signature, signatures};
+use fmi_abi::calls::{Random, Signature, signatures};
 use fmi_abi::{BaseType, Causality, Mode};
 
 /// Number of crashes after which no further call sequence of a rule is executed.
@@ -326,7 +325,7 @@ pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
         bytes[..bytes.len() / 2].to_vec(),
         [bytes.clone(), bytes.clone()].concat(),
     ];
-    let mut random = Random::new(checker.seed);
+    let mut random = Random::mixed(checker.seed);
     for _ in 0..20 {
         let mut damaged = bytes.clone();
         for _ in 0..if damaged.is_empty() { 0 } else { 3 } {

@@ -1,10 +1,16 @@
-//! Pseudorandom numbers that are the same in every run.
+//! Pseudorandom numbers for programs that test FMUs. They are the same in every run.
 
 /// Generator; its field is the state, which is initially the seed.
 #[derive(Debug)]
 pub struct Random(pub u64);
 
 impl Random {
+    /// Creates a generator whose first numbers differ even if seeds are consecutive numbers.
+    #[must_use]
+    pub fn mixed(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
     /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         // Knuth's multiplier. The low bits are less random, so the high bits are mixed into them.
@@ -22,7 +28,10 @@ impl Random {
         self.between(0.0, 1.0) < probability
     }
 
-    /// Returns an integer below `count`, which must not be 0.
+    /// Returns an integer below `count`.
+    ///
+    /// # Panics
+    /// Panics if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         (self.bits() >> 33) as usize % count
     }
