@@ -9,6 +9,8 @@ use types::*;
 /// their arguments and results. The functions on an instance follow as `name CS ME tolerated (arguments);`, where `CS`
 /// and `ME` are the states in which the standard allows the call in Co-Simulation and Model Exchange.
 ///
+/// The exporter generates each C function from its row (`symbols!` and `c_functions!` of fmu-export).
+///
 /// Each letter is a column of the tables in sections 4.2.4 and 3.2.3 of FMI 2.0: I instantiated, N initialization, C
 /// step complete, F step failed, M event, K continuous time, T terminated, E error. Fatal has no letter, because no
 /// call is allowed in it. For `fmi2Set...`, the list contains all columns in which any variable can be set;

@@ -1,5 +1,5 @@
-//! Fast paths of the C functions that an importer calls for every step. They have the names and arguments of the C
-//! functions.
+//! Fast paths of the C functions that an importer calls for every step. They have the arguments of the C functions; the
+//! macro [`call`] lists which functions have which fast paths.
 //!
 //! Each function either does all the work and returns true, or writes nothing into the importer's memory and returns
 //! false. In the latter case, the general path handles the call and reports errors. Both paths make equivalent
@@ -22,7 +22,6 @@
 //!
 //! # Safety
 //! The contract of the C functions also applies to these functions.
-#![allow(non_snake_case)]
 #![allow(clippy::missing_safety_doc, reason = "every function has the contract above")]
 #![allow(clippy::too_many_arguments, reason = "the FMI standard defines the arguments")]
 
@@ -30,10 +29,6 @@ use crate::export::Exported;
 use crate::instance::{FromOne, Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
-
-/// Name of this module in the macro [`call`], because the module contains the fast paths for the most frequent
-/// arguments.
-pub(crate) use super::short as usual;
 
 /// Returns whether the pointers can be arrays of `count` elements: they are not NULL and are aligned, and the arrays
 /// are neither empty nor larger than memory.
@@ -88,7 +83,7 @@ unsafe fn set<M: Exported, R: Reference>(
 }
 
 #[inline(always)]
-pub(crate) unsafe fn fmi2GetReal<M: Exported>(
+pub(crate) unsafe fn get_reals<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const u32,
     count: usize,
@@ -99,7 +94,7 @@ pub(crate) unsafe fn fmi2GetReal<M: Exported>(
 }
 
 #[inline(always)]
-pub(crate) unsafe fn fmi2SetReal<M: Exported>(
+pub(crate) unsafe fn set_reals<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const u32,
     count: usize,
@@ -110,51 +105,7 @@ pub(crate) unsafe fn fmi2SetReal<M: Exported>(
 }
 
 #[inline(always)]
-pub(crate) unsafe fn fmi2DoStep<M: Exported>(
-    instance: &mut Instance<M>,
-    point: f64,
-    size: f64,
-    _no_set_fmu_state_prior_to_current_point: i32,
-) -> bool {
-    instance.step_fast(point, size)
-}
-
-/// Fast paths for steps of other sizes than the last. They are separate, because they call a function that is not
-/// inlined, for which the fast path of the usual step would have to save registers.
-pub(crate) mod any_size {
-    use super::{Exported, Instance, fmi3_step, fmi3Boolean};
-
-    #[inline(always)]
-    pub(crate) unsafe fn fmi2DoStep<M: Exported>(
-        instance: &mut Instance<M>,
-        point: f64,
-        size: f64,
-        _no_set_fmu_state_prior_to_current_point: i32,
-    ) -> bool {
-        instance.step_any_size(point, size)
-    }
-
-    #[inline(always)]
-    pub(crate) unsafe fn fmi3DoStep<M: Exported>(
-        instance: &mut Instance<M>,
-        point: f64,
-        size: f64,
-        _no_set_fmu_state_prior_to_current_point: fmi3Boolean,
-        event_handling_needed: *mut fmi3Boolean,
-        terminate_simulation: *mut fmi3Boolean,
-        early_return: *mut fmi3Boolean,
-        last_successful_time: *mut f64,
-    ) -> bool {
-        let flags = [event_handling_needed, terminate_simulation, early_return];
-        // SAFETY: the caller guarantees the contract.
-        unsafe {
-            fmi3_step(flags, last_successful_time, point + size, || instance.step_any_size(point, size))
-        }
-    }
-}
-
-#[inline(always)]
-pub(crate) unsafe fn fmi3GetFloat64<M: Exported>(
+pub(crate) unsafe fn get_float64s<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const u32,
     count: usize,
@@ -166,7 +117,7 @@ pub(crate) unsafe fn fmi3GetFloat64<M: Exported>(
 }
 
 #[inline(always)]
-pub(crate) unsafe fn fmi3SetFloat64<M: Exported>(
+pub(crate) unsafe fn set_float64s<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const u32,
     count: usize,
@@ -177,8 +128,32 @@ pub(crate) unsafe fn fmi3SetFloat64<M: Exported>(
     value_count == count && unsafe { set::<M, FromOne>(instance, vr, values, count) }
 }
 
+/// A step of the last size in FMI 2.0.
 #[inline(always)]
-pub(crate) unsafe fn fmi3DoStep<M: Exported>(
+pub(crate) unsafe fn step<M: Exported>(
+    instance: &mut Instance<M>,
+    point: f64,
+    size: f64,
+    _no_set_fmu_state_prior_to_current_point: i32,
+) -> bool {
+    instance.step_fast(point, size)
+}
+
+/// A step of any size in FMI 2.0. It is separate, because it calls a function that is not inlined, for which the fast path of
+/// a step of the last size would have to save registers.
+#[inline(always)]
+pub(crate) unsafe fn step_any_size<M: Exported>(
+    instance: &mut Instance<M>,
+    point: f64,
+    size: f64,
+    _no_set_fmu_state_prior_to_current_point: i32,
+) -> bool {
+    instance.step_any_size(point, size)
+}
+
+/// A step of the last size in FMI 3.0.
+#[inline(always)]
+pub(crate) unsafe fn fmi3_step<M: Exported>(
     instance: &mut Instance<M>,
     point: f64,
     size: f64,
@@ -190,13 +165,30 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
 ) -> bool {
     let flags = [event_handling_needed, terminate_simulation, early_return];
     // SAFETY: the caller guarantees the contract.
-    unsafe { fmi3_step(flags, last_successful_time, point + size, || instance.step_fast(point, size)) }
+    unsafe { step_to(flags, last_successful_time, point + size, || instance.step_fast(point, size)) }
+}
+
+/// A step of any size in FMI 3.0.
+#[inline(always)]
+pub(crate) unsafe fn fmi3_step_any_size<M: Exported>(
+    instance: &mut Instance<M>,
+    point: f64,
+    size: f64,
+    _no_set_fmu_state_prior_to_current_point: fmi3Boolean,
+    event_handling_needed: *mut fmi3Boolean,
+    terminate_simulation: *mut fmi3Boolean,
+    early_return: *mut fmi3Boolean,
+    last_successful_time: *mut f64,
+) -> bool {
+    let flags = [event_handling_needed, terminate_simulation, early_return];
+    // SAFETY: the caller guarantees the contract.
+    unsafe { step_to(flags, last_successful_time, point + size, || instance.step_any_size(point, size)) }
 }
 
 /// Makes a step, if no pointer is NULL and all are aligned. If `step` succeeds, it has reached its end without an
 /// event, so all flags are false and the last successful time is `end`.
 #[inline(always)]
-unsafe fn fmi3_step(
+unsafe fn step_to(
     flags: [*mut fmi3Boolean; 3],
     last_successful_time: *mut f64,
     end: f64,
@@ -220,14 +212,14 @@ unsafe fn fmi3_step(
 }
 
 /// Calls the body of a function for model `M`. If the function has fast paths, tries them first: the names in
-/// brackets are their modules, in this order, after whether they call the model to make a step.
+/// brackets, in this order, after whether they call the model to make a step.
 macro_rules! call {
-    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi2GetReal $arguments) };
-    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi2SetReal $arguments) };
-    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [usual any_size] fmi2DoStep $arguments) };
-    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi3GetFloat64 $arguments) };
-    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [usual] fmi3SetFloat64 $arguments) };
-    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [usual any_size] fmi3DoStep $arguments) };
+    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [get_reals] fmi2GetReal $arguments) };
+    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@fast false [set_reals] fmi2SetReal $arguments) };
+    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [step step_any_size] fmi2DoStep $arguments) };
+    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [get_float64s] fmi3GetFloat64 $arguments) };
+    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@fast false [set_float64s] fmi3SetFloat64 $arguments) };
+    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@fast true [fmi3_step fmi3_step_any_size] fmi3DoStep $arguments) };
     (@fast $steps:literal [] $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
         $crate::boundary::call::<M>($c, Function::$function.rule(), |instance| {
             bodies::$function(instance $(, $argument)*)
@@ -246,7 +238,7 @@ macro_rules! call {
             }
         }
         let fast_path = move |instance: *mut $crate::instance::Instance<M>| {
-            $crate::boundary::short::$path::$function(&mut *instance $(, $argument)*)
+            $crate::boundary::short::$path(&mut *instance $(, $argument)*)
         };
         match $crate::boundary::call_fast::<M, $steps>($c, Function::$function.rule(), fast_path) {
             Some(status) => status,
