@@ -1,8 +1,12 @@
 //! Options of a check.
 
+use crate::finding::topic_of;
 use crate::rules;
 use clap::{Args as _, FromArgMatches as _};
 use std::path::PathBuf;
+
+/// Topics that are not part of a quick check.
+const LONG: [&str; 2] = ["malformed", "resources"];
 
 /// Options of a check, which are also the options of the command line.
 #[derive(Clone, Debug, clap::Args)]
@@ -67,6 +71,17 @@ pub struct Options {
     /// is not a mistake.
     #[arg(skip)]
     pub is_build: bool,
+}
+
+impl Options {
+    /// Returns whether a topic or a rule is to be checked.
+    pub(crate) fn wants(&self, name: &str) -> bool {
+        let topic = topic_of(name);
+        match self.only.is_empty() {
+            true => !self.quick || !LONG.contains(&topic),
+            false => self.only.iter().any(|only| only == topic || only == name),
+        }
+    }
 }
 
 /// The defaults of the command.

@@ -3,6 +3,7 @@
 use crate::call_sequence::{Arg, CallSequence, Numbered, Setting, Step, all_steps, step_name, unfold};
 use crate::checker::Checker;
 use crate::evidence::{Evidence, Replay};
+use crate::opening::opened;
 use crate::options::{INTERFACES, Options};
 use crate::report::SCHEMA;
 use crate::reproduce::{Printed, expectation};
@@ -80,7 +81,7 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
     let path = options.fmu.as_ref().unwrap_or(&report.fmu);
     let unpacking = Options { execution_tool: true, memory: replay.memory >> 20, ..Options::default() };
     // The checker is dropped before the directory is removed, because its processes use the directory until they end.
-    let (_scratch, checker) = crate::opened(path, &unpacking, Instant::now())
+    let (_scratch, checker) = opened(path, &unpacking, Instant::now())
         .context("the FMU cannot be called; --fmu names another file")?;
     let description = &checker.description;
     let folded = with_token(&replay.sequence, &report.token, &description.token);
