@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built import ROOT
+from built import ROOT, built
 from instance import assert_close
 from lagrange import OUTPUTS, linear_model, table_1
 from reference import backward_slope, follow
 
+from prw import simulate
 from prw.recording import read_motion as read
 
 EXAMPLES = ROOT / "examples"
@@ -72,6 +73,36 @@ def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
     assert_close(columns, expected, 1e-10)
     for output in ("tau1", "tau2", "pitch_rate"):
         assert abs(columns[output][0]) < 1e-12, f"{output} is not zero at the start"
+
+
+def test_measured_columns_are_compared(prw: Any, tmp_path: Path) -> None:
+    """The recording is the solution of the equations with an offset and an alternating error of known sizes, and with empty cells."""
+    motion = read(EXAMPLES / "point_to_point.csv")
+    expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, motion.omega)
+    error = np.where(np.arange(len(motion.time)) % 2, 1.0, -1.0)
+    tau1, pitch = expected["tau1"] + 0.5 + 0.02 * error, np.rad2deg(expected["pitch"]) - 2
+    columns = np.column_stack([motion.time, motion.theta, motion.omega, tau1, pitch])
+    rows = [",".join(f"{value:.17g}" for value in row) for row in columns]
+    rows[4:9] = [row.rpartition(",")[0] + "," for row in rows[4:9]]
+    header = "time,theta1,theta2,omega1,omega2,tau1,pitch [deg],site"
+    (tmp_path / "run.csv").write_text("\n".join([header, *(f"{row},9" for row in rows)]))
+    result = prw("simulate", "run.csv")
+    assert result.returncode == 0 and "columns ignored: site\n" in result.stdout, result
+    share = 0.02 / np.ptp(tau1)
+    assert (
+        f"differences tau1 +0.5 N.m on average; without that 0.02 N.m rms, {share:.2%} of the measured range\n"
+        in result.stdout
+    )
+    assert re.search(r"\n {12}pitch -2 deg on average; without that \S+e-\d+ deg rms, 0\.00% of the", result.stdout)
+    # The other outputs were not measured.
+    assert result.stdout.count("on average") == 2
+    run = simulate(tmp_path / "run.csv", fmu=built("prw_testbed.fmu"))
+    np.testing.assert_array_equal(np.isnan(run.differences["pitch"]).nonzero()[0], np.arange(4, 9))
+    measured = {axis.get_title(loc="left"): [line.get_ydata() for line in axis.lines[2:]] for axis in run.plot().axes}
+    (torques,), (angles,) = measured.pop("Sensor torques"), measured.pop("Pitch and roll angles")
+    assert not any(measured.values())
+    np.testing.assert_allclose(torques, tau1, rtol=1e-12)
+    np.testing.assert_allclose(angles, np.delete(pitch, np.arange(4, 9)), rtol=1e-12)
 
 
 def test_other_parameters(prw: Any, tmp_path: Path) -> None:

@@ -50,12 +50,14 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes: title, y label with unit, and two curves as (legend entry, values (n,)) with their colours."""
+    """One set of axes: title, y label with unit, two curves as (legend entry, values (n,)) with their colours, and measured
+    values (n,) of these curves, in the same unit."""
 
     title: str
     label: str
     curves: Sequence[tuple[str, Array]]
     colours: tuple[str, str] = (BLUE, VERMILION)
+    measured: Sequence[Array] = ()
 
 
 class ShownFigure(Figure):
@@ -76,36 +78,44 @@ def motion_panel(motion: Motion, angles: bool) -> Panel:
     return Panel("Motor velocities", label, [("motor 1", y1), ("motor 2", y2)])
 
 
-def response_panels(response: Mapping[str, Array], angles: bool) -> list[Panel]:
+def response_panels(response: Mapping[str, Array], angles: bool, measured: Mapping[str, Array] = {}) -> list[Panel]:
     """The wrist: pitch and roll rates (with `angles` also the angles in degrees), and the sensor torques, if `response` has
-    them."""
-    known = [
-        Panel(
-            "Pitch and roll rates",
-            "θ₇′, θ₈′  (rad/s)",
-            _both(response, "pitch_rate", "roll_rate", ("pitch", "roll")),
-            (GREEN, PURPLE),
-        ),
-        Panel("Sensor torques", "τ₁, τ₂  (N m)", _both(response, "tau1", "tau2", ("sensor 1", "sensor 2"))),
-    ]
+    them; and the measured values of these outputs."""
+
+    def panel(
+        title: str,
+        label: str,
+        names: tuple[str, str],
+        entries: tuple[str, str],
+        colours: tuple[str, str],
+        factor: float,
+    ) -> list[Panel]:
+        if not set(names) <= set(response):
+            return []
+        curves = [(entry, factor * response[name]) for name, entry in zip(names, entries)]
+        return [Panel(title, label, curves, colours, [factor * measured[name] for name in names if name in measured])]
+
+    wrist, motors, degree = (GREEN, PURPLE), (BLUE, VERMILION), float(np.rad2deg(1))
+    outputs, shafts, sensors = ("pitch", "roll"), ("shaft 1", "shaft 2"), ("sensor 1", "sensor 2")
+    found = []
+    if angles and not {"theta3", "theta4"}.isdisjoint(measured):
+        found += panel("Shaft angles", "θ₃, θ₄  (deg)", ("theta3", "theta4"), shafts, motors, degree)
     if angles:
-        curves = [(entry, np.rad2deg(y)) for entry, y in _both(response, "pitch", "roll", ("pitch", "roll"))]
-        known.insert(0, Panel("Pitch and roll angles", "θ₇, θ₈  (deg)", curves, (GREEN, PURPLE)))
-    return [panel for panel in known if panel.curves]
+        found += panel("Pitch and roll angles", "θ₇, θ₈  (deg)", ("pitch", "roll"), outputs, wrist, degree)
+    found += panel("Pitch and roll rates", "θ₇′, θ₈′  (rad/s)", ("pitch_rate", "roll_rate"), outputs, wrist, 1.0)
+    return found + panel("Sensor torques", "τ₁, τ₂  (N m)", ("tau1", "tau2"), sensors, motors, 1.0)
 
 
-def _both(response: Mapping[str, Array], one: str, other: str, entries: tuple[str, str]) -> list[tuple[str, Array]]:
-    if one not in response or other not in response:
-        return []
-    return [(entries[0], response[one]), (entries[1], response[other])]
-
-
-def draw_response(title: str, motion: Motion, response: Mapping[str, Array], angles: bool) -> Figure:
+def draw_response(
+    title: str, motion: Motion, response: Mapping[str, Array], angles: bool, measured: Mapping[str, Array] = {}
+) -> Figure:
     """Motor motion, pitch and roll, and torques over time.
 
-    `angles`: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4.
+    angles: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4. measured: outputs that
+    are drawn over those of `response`; the angles of the shafts have a panel only if they were measured.
     """
-    return draw_panels(title, motion.time, [motion_panel(motion, angles), *response_panels(response, angles)])
+    panels = response_panels(response, angles, measured)
+    return draw_panels(title, motion.time, [motion_panel(motion, angles), *panels])
 
 
 def draw_panels(title: str, time: Array, panels: Sequence[Panel], height: float = 2.1) -> Figure:
@@ -128,15 +138,22 @@ def draw_into(figure: Any, time: Array, panels: Sequence[Panel]) -> None:
 
 
 def _draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
-    """Draw the panel's two curves over time (n,) in s, with a legend at the right end of the title's line."""
+    """Draw the panel's two curves over time (n,) in s, with a legend at the right end of the title's line. Measured values are
+    thin dark lines over thick pale curves, so that both are visible where they agree."""
     axis.set_title(panel.title)
     axis.set_ylabel(panel.label)
     # The second curve is dashed, so that two equal curves still show as two; a dense one is translucent instead.
     dense = len(time) > 2 * INTERVALS
     second: dict[str, Any] = {"alpha": 0.6} if dense else {"dashes": (4, 2)}
     for (name, y), colour, style in zip(panel.curves, panel.colours, ({}, second)):
+        if panel.measured:
+            style = {"linewidth": 3, "alpha": 0.6}
         axis.plot(*envelope(time, y), color=colour, label=name, **style)
-    axis.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0)
+    for label, y in zip(["measured", None], panel.measured):
+        known = ~np.isnan(y)
+        if known.any():
+            axis.plot(*envelope(time[known], y[known]), color="0.15", linewidth=0.8, label=label)
+    axis.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=3, borderaxespad=0)
     axis.margins(x=0, y=0.08)
     if max(np.abs(y).max() for _, y in panel.curves) < ROUNDING:
         axis.set_ylim(-1, 1)

@@ -17,7 +17,7 @@ from prw.columns import MEASURED, QUANTITIES, si_unit
 from prw.errors import need
 from prw.files import write_table
 from prw.motion import Array, Motion, fig4
-from prw.recording import Recording, read_motion
+from prw.recording import Recording, read, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
 #: Sampling error, as a fraction of the peak, above which there is a warning.
@@ -47,6 +47,8 @@ class Run(Mapping[str, Array]):
         short.
     beginning
         The effect of motors that turn already at the first sample, or None. The sampling errors are then those after its end.
+    measured
+        The measured values, (n,), of those outputs of the run that the recording contains; NaN where a cell is empty.
     """
 
     def __init__(
@@ -56,9 +58,11 @@ class Run(Mapping[str, Array]):
         parameters: Mapping[str, Value],
         sampling_errors: Mapping[str, float] = {},
         beginning: Beginning | None = None,
+        measured: Mapping[str, Array] = {},
     ):
         self.motion, self.parameters, self.beginning = motion, dict(parameters), beginning
         self._outputs, self.sampling_errors = dict(outputs), dict(sampling_errors)
+        self.measured = {name: values for name, values in measured.items() if name in self._outputs}
 
     @property
     def notes(self) -> list[str]:
@@ -103,6 +107,11 @@ class Run(Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self._outputs)
 
+    @property
+    def differences(self) -> dict[str, Array]:
+        """The measured minus the simulated values, (n,), of each measured output; NaN where nothing was measured."""
+        return {name: values - self[name] for name, values in self.measured.items()}
+
     def recording(self) -> Recording:
         """The run as a recording of those outputs that can also be measured."""
         measured = {name: self[name] for name in MEASURED if name in self}
@@ -122,8 +131,8 @@ class Run(Mapping[str, Array]):
         return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
 
     def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
-        """A figure of the motors, pitch and roll, and the torques over time, if the run has them. Save the figure with
-        `.savefig(path)`.
+        """A figure of the motors, pitch and roll, and the torques over time, if the run has them, with the measured
+        values over the simulated ones. Save the figure with `.savefig(path)`.
 
         angles: show the angles of motors and wrist, in degrees. If false, the wrist's angles are left out, and the motors'
         rates, if they are known, replace their angles, as in Fig. 4. Raises UserError without matplotlib.
@@ -132,7 +141,7 @@ class Run(Mapping[str, Array]):
         from prw.plots import draw_response
 
         title = f"Response to {self.motion.name}" if title is None else title
-        return draw_response(title, self.motion, self, angles)
+        return draw_response(title, self.motion, self, angles, self.measured)
 
     def __repr__(self) -> str:
         notes = "".join(f"\n  note: {note}" for note in self.notes)
@@ -162,8 +171,9 @@ def simulate(
     Parameters
     ----------
     motion
-        The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
-        only its motors matter here), or a run whose motion is repeated. Default: the paper's experiment of Fig. 4.
+        The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it),
+        or a run whose motion is repeated. Default: the paper's experiment of Fig. 4. The run contains the measured outputs
+        of a recording for comparison.
     parameters
         Values of parameters by name, in SI or with a unit as in (1.9, "N.m/deg"), or the path of a JSON file that `prw
         identify` has written. Other parameters keep the FMU's start values.
@@ -187,6 +197,8 @@ def simulate(
     UserWarning
         The motors of a recording, or of a Motion without rates, turn at the first sample already, or are sampled so coarsely that an output may be off by more than 1 % of its peak.
     """
+    if motion is not None and not isinstance(motion, (Motion, Recording, Run)):
+        motion = read(motion)
     moved = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
@@ -206,7 +218,8 @@ def simulate(
     # If all samples are at the beginning, the other warning covers the error.
     late = slice(int(np.searchsorted(moved.time[::2], settled)), None)
     errors = {name: _sampling_error(found[name], other[name], late) for name in other}
-    run = Run(moved, found, values, errors, begins)
+    measured = motion.measured if isinstance(motion, Recording) else {}
+    run = Run(moved, found, values, errors, begins, measured)
     for doubt in run.doubts:
         warnings.warn(doubt, UserWarning, stacklevel=2)
     return run

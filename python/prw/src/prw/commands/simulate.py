@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prw.animation import animate, suffix_of
+from prw.columns import QUANTITIES, si_unit
 from prw.commands.options import (
     add_parameter_options,
     add_paths,
@@ -24,8 +25,8 @@ from prw.commands.options import (
 )
 from prw.errors import MissingPackage, UserError, one_line
 from prw.files import replacing
-from prw.motion import fig4
-from prw.recording import read_motion
+from prw.motion import Motion, fig4
+from prw.recording import Recording, read
 from prw.simulation import Run, simulate
 from prw.testbed import existing_fmu
 
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
         suffix_of(arguments.animate)
     recorded = arguments.input is not None
     if recorded:
-        motion = call(read_motion, arguments, path=arguments.input)
+        motion: Motion | Recording = call(read, arguments, path=arguments.input)
         title = f"Response to {one_line(arguments.input.name)}"
     else:
         if arguments.degrees is not None:
@@ -139,6 +140,7 @@ def _summary(
         lines.append("            motors at opposite rates turn the wrist about its roll axis only, as in the paper")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
+    lines += _differences(response)
     lines.append(f"wrote       {', '.join(map(str, written))}")
     if missing:
         lines.append(f"no figure   {missing}")
@@ -151,6 +153,22 @@ def _summary(
             f"next        {look}; {existing_fmu(arguments.fmu)} also runs in FMPy, OpenModelica and other tools"
         )
     return lines
+
+
+def _differences(response: Run) -> list[str]:
+    """The measured minus the simulated values, one line for each measured output. Their mean is mostly the sensor's offset."""
+    rows = []
+    for name, difference in response.differences.items():
+        known = ~np.isnan(difference)
+        if known.any():
+            factor, unit = (float(np.rad2deg(1)), "deg") if QUANTITIES[name] == "angle" else (1.0, si_unit(name))
+            mean, rest = float(difference[known].mean()), float(difference[known].std())
+            span = float(np.ptp(response.measured[name][known]))
+            share = f", {rest / span:.2%} of the measured range" if span else ""
+            rows.append(
+                f"{name} {factor * mean:+.2g} {unit} on average; without that {factor * rest:.2g} {unit} rms{share}"
+            )
+    return [f"{head:<11} {row}" for head, row in zip(["differences", *[""] * len(rows)], rows)]
 
 
 def _program() -> str:
