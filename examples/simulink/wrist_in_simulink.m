@@ -81,6 +81,7 @@ function fmu = add_fmu(model, file)
 % Adds the FMU as a block with steps of 1 ms. Returns its name, and the names of its ports in their order.
 [~, fmu.name] = fileparts(file);
 fmu.block = [model '/' fmu.name];
+load_system('simulink_extras');
 add_block('simulink_extras/FMU Import/FMU', fmu.block);
 set_param(fmu.block, 'FMUName', file);
 set_param(fmu.block, 'FMUMode', 'CoSimulation', 'FMUSampleTime', '0.001');
