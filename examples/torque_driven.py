@@ -101,11 +101,11 @@ def main() -> tuple[Figure, dict[float, tuple[float, float]]]:
         print(f"{1e3 * h:4g} ms  {held:.1f} %  {f'{extrapolated:.1f} %' if extrapolated < 100 else 'unstable'}")
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     angles, torques = figure.subplots(1, 2)
-    for name, colour in (("pitch", "#0072B2"), ("roll", "#D55E00")):
+    for name, colour in (("pitch", "#009E73"), ("roll", "#CC79A7")):
         angles.plot(time, np.rad2deg(moved[name]), color=colour, label=name)
     coarse, held = simulate(STEPS[0], False, jump, end=0.1)
-    torques.plot(1e3 * coarse, held["tau1"], ".-", color="#CC79A7", label="tau1 after a step, held over 5 ms")
-    torques.plot(1e3 * FINEST * np.arange(len(exact["tau1"])), exact["tau1"], color="#009E73", label="in small steps")
+    torques.plot(1e3 * coarse, held["tau1"], ".-", color="0.5", label="tau1 after a step, held over 5 ms")
+    torques.plot(1e3 * FINEST * np.arange(len(exact["tau1"])), exact["tau1"], color="#0072B2", label="in small steps")
     angles.set(xlabel="time (s)", ylabel="angle (deg)")
     torques.set(xlabel="time (ms)", ylabel="torque (N.m)", xlim=(0, 100))
     for axes in (angles, torques):

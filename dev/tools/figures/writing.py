@@ -46,12 +46,12 @@ def write_png(path: Path, figure: Figure) -> None:
 
 
 def write_small_png(path: Path, figure: Figure) -> None:
-    """Write the figure as PNG of 32 colours, some ten kilobytes."""
+    """Write the figure as PNG of 128 colours, some ten kilobytes. With fewer, thin curves get the colour of the grid."""
     pixels = io.BytesIO()
     with matplotlib.rc_context(PAGE_STYLE):
         figure.savefig(pixels, dpi=110, format="png")
     with replacing(path) as temporary:
-        few = Image.open(pixels).convert("RGB").quantize(32, dither=Image.Dither.NONE)
+        few = Image.open(pixels).convert("RGB").quantize(128, dither=Image.Dither.NONE)
         few.save(temporary, format="PNG", optimize=True)
 
 

@@ -122,12 +122,44 @@ fn draw(
             .border_style(TRANSPARENT)
             .margin(8 * FINE)
             .legend_area_size(30 * FINE)
-            .position(SeriesLabelPosition::UpperRight)
+            .position(corner(
+                &panel.iter().map(|column| &column.values[..]).collect::<Vec<_>>(),
+                panel.iter().map(|column| column.name.chars().count()).max().unwrap_or_default(),
+                (low - margin, high + margin),
+            ))
             .label_font(("sans-serif", 14 * FINE))
             .draw()?;
     }
     root.present()?;
     Ok(())
+}
+
+/// Returns the corner of a panel in which the legend covers the fewest points of the curves. `longest` is the number of characters of
+/// the longest name, and the range is the one of the vertical axis.
+fn corner(curves: &[&[f64]], longest: usize, (low, high): (f64, f64)) -> SeriesLabelPosition {
+    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+    // About 9 of 740 px for a character, and 22 of 190 px for a line.
+    let width = (0.08 + 0.012 * longest as f64).min(0.5);
+    let height = (0.06 + 0.115 * curves.len() as f64).min(0.5);
+    let covered = |is_right: bool, is_upper: bool| {
+        let points = curves.iter().flat_map(|values| {
+            let last = (values.len().max(2) - 1) as f64;
+            values.iter().enumerate().map(move |(row, value)| (row as f64 / last, *value))
+        });
+        let is_covered = |&(x, value): &(f64, f64)| {
+            let y = (value - low) / (high - low);
+            (if is_right { 1.0 - x } else { x }) < width && (if is_upper { 1.0 - y } else { y }) < height
+        };
+        points.filter(is_covered).count()
+    };
+    let corners = [
+        (UpperRight, true, true),
+        (UpperLeft, false, true),
+        (LowerRight, true, false),
+        (LowerLeft, false, false),
+    ];
+    let best = corners.into_iter().min_by_key(|&(_, is_right, is_upper)| covered(is_right, is_upper));
+    best.map_or(UpperRight, |(position, ..)| position)
 }
 
 /// Returns whether a variable is drawn: numbers always, strings only if they have few different values, and bytes never.
@@ -165,7 +197,20 @@ fn label(value: f64, range: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::label;
+    use super::{corner, label};
+    use plotters::prelude::SeriesLabelPosition;
+
+    #[test]
+    fn the_legend_is_in_a_corner_without_curves() {
+        let curve =
+            |value: fn(f64) -> f64| (0..=100).map(|row| value(f64::from(row) / 100.0)).collect::<Vec<_>>();
+        let (rising, falling, low) = (curve(|x| x), curve(|x| 1.0 - x), curve(|_| 0.02));
+        let position = |curves: &[&[f64]]| corner(curves, 1, (-0.05, 1.05));
+        assert!(matches!(position(&[&rising]), SeriesLabelPosition::UpperLeft));
+        assert!(matches!(position(&[&falling]), SeriesLabelPosition::UpperRight));
+        assert!(matches!(position(&[&rising, &low]), SeriesLabelPosition::UpperLeft));
+        assert!(matches!(position(&[&rising, &falling, &low]), SeriesLabelPosition::UpperRight));
+    }
 
     #[test]
     fn axes_have_plain_numbers() {
