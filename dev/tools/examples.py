@@ -20,13 +20,12 @@ EXAMPLES = (
     "identify",
     "tolerances",
     "gains",
-    "learned_move",
-    "learned_limits",
+    "task",
     "predictive_control",
     "torque_driven",
 )
 #: The durations and the rate that examples measure and print.
-TIMES = re.compile(r"(?<= s in )[\d.]+(?= s$)|(?<=^learned in )[\d.]+|^[\d.]+(?= decisions per second)", re.MULTILINE)
+TIMES = re.compile(r"(?<= s in )[\d.]+(?= s$)|^[\d.]+(?= decisions per second)", re.MULTILINE)
 HEAD = """# Examples
 
 <!-- written by make docs -->

@@ -165,38 +165,14 @@ def test_identify_finds_the_parameters_of_the_simulated_rig(tmp_path: Path, caps
         assert abs(estimate.value - float(truth[name])) < 4 * estimate.standard_error
 
 
-@pytest.fixture(scope="module")
-def learned() -> Any:
-    return importlib.import_module("learned_move")
-
-
-def test_shapers_leave_no_vibration_of_the_nominal_wrist(learned: Any) -> None:
-    """The oracle calculates the vibration. With one impulse, which is the quintic without a shaper, vibration remains."""
-    left = {}
-    for impulses in (1, 2, 3):
-        slope = np.append(learned.shaped(impulses, 0.25), 0.0)
-        theta = np.append(0.0, learned.STEP * np.cumsum(slope[:-1]))
-        assert theta[-1] == pytest.approx(learned.GOAL, rel=1e-9)
-        time = learned.STEP * np.arange(len(theta))
-        at, _ = follow(linear_model(table_1()), time, np.tile(theta, (2, 1)).T, np.tile(slope, (2, 1)).T)
-        left[impulses] = np.rad2deg(np.ptp(at["pitch"][round(0.25 / learned.STEP) :]))
-    assert left[1] > 2 and left[2] < 0.05 and left[3] < 0.05
-
-
-@pytest.mark.long
-def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> None:
-    figure, left = learned.main(count=512, rounds=40, fresh=100)
-    assert {name: len(values) for name, values in left.items()} == dict.fromkeys(left, 100)
-    assert left["learned"].mean() < 0.5 * left["ZV"].mean() < 0.1 * left["quintic"].mean()
-    assert len(figure.axes) == 2
-
-
-@pytest.mark.long
-def test_a_little_learning_beats_every_lqr() -> None:
-    limits = importlib.import_module("learned_limits")
-    figure, away = limits.main(count=512, rounds=24, fresh=200)
-    assert away["learned"].mean() < 0.97 * away["best LQR"].mean()
-    assert len(figure.axes) == 3
+def test_each_gain_of_the_task_meets_the_same_episodes() -> None:
+    """With equal gains, the returns are equal. The returns of the page are of 256 episodes each."""
+    task = importlib.import_module("task")
+    figure, returns = task.main(count=64)
+    assert max(returns, key=lambda gain: returns[gain].mean()) == 8.0 and len(figure.axes) == 4
+    total, away = task.play(task.VectorEnv(task.TASK, 8), np.full(8, 8.0), [*range(4)] * 2)
+    np.testing.assert_array_equal(total[:4], total[4:])
+    assert np.abs(away[-1]).max() < 1
 
 
 def test_planned_motion_reaches_the_goal_and_stays(capsys: pytest.CaptureFixture[str]) -> None:
