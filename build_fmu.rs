@@ -69,11 +69,12 @@ fn run(matches: &ArgMatches) -> Result<()> {
     builder.run(&BuildOptions::from_arg_matches(matches)?)
 }
 
-/// Returns the page of the FMU, the scripts that draw the wrist there, and the controller FMU that closes the loop.
+/// Returns the pages of the FMU, the scripts that draw the wrist there, and the controller FMU that closes the loop.
 fn page() -> Page {
     let own = [include_str!("docs/fmu-page/wrist/testbed.js"), include_str!("docs/fmu-page/wrist/steps.js")];
     Page {
         html: Some(prw_page::testbed),
+        others: vec![("manual.html", prw_page::manual)],
         scripts: [&prw_page::WRIST[..], &own].concat(),
         companions: vec!["prw_controller"],
     }

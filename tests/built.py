@@ -41,10 +41,16 @@ def program(name: str, package: str = "build_fmu") -> list[str]:
     return ["cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", name, "--"]
 
 
-def text_of(fmu: Path) -> str:
-    """Returns the page in an FMU without the parts that run the FMU."""
+def pages_of(fmu: Path) -> dict[str, str]:
+    """Returns the pages in an FMU by name, without the parts that run the FMU."""
     with zipfile.ZipFile(fmu) as archive:
-        return LIVE.sub("", archive.read("documentation/index.html").decode())
+        names = [name for name in ("index.html", "manual.html") if f"documentation/{name}" in archive.namelist()]
+        return {name: LIVE.sub("", archive.read(f"documentation/{name}").decode()) for name in names}
+
+
+def text_of(fmu: Path) -> str:
+    """Returns the pages in an FMU one after the other, without the parts that run the FMU."""
+    return "".join(pages_of(fmu).values())
 
 
 def needed(module: str, package: str) -> None:

@@ -32,6 +32,8 @@ def make(libraries: Mapping[str, Mapping[Target, Path]], out: Path, scratch: Pat
     (scratch / "source" / f"{MODEL}.fmu").rename(out / f"{MODEL}-source.fmu")
     with zipfile.ZipFile(out / f"{MODEL}.fmu") as archive:
         (out / f"{MODEL}.html").write_bytes(archive.read(PAGE))
+        # The page links to it.
+        (out / "manual.html").write_bytes(archive.read("documentation/manual.html"))
     _run(
         "build_closed_loop", f"--testbed={out / MODEL}.fmu", f"--controller={out / CONTROLLER}.fmu", f"--out={scratch}"
     )

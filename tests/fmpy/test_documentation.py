@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from built import ROOT, built, text_of
+from built import ROOT, built, pages_of, text_of
 from fmpy import simulate_fmu
 from lagrange import OUTPUTS
 from lxml import etree
@@ -56,15 +56,20 @@ def test_the_fmu_contains_the_icons(name, sources):
 
 @pytest.mark.parametrize("name", ["testbed", "controller"])
 def test_the_page_is_well_formed_and_loads_nothing(name):
-    page = text_of(built(f"prw_{name}.fmu"))
-    etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
-    ids = re.findall(r'\sid="([^"]+)"', page)
-    assert len(ids) == len(set(ids)) and {*re.findall(r'(?:href="|url\()#([^")]+)', page)} <= {*ids}
-    assert len(page.encode()) < 400e3
-    assert "<script" not in page and "@import" not in page and "javascript:" not in page
-    links = re.findall(r'(?:href|src)\s*=\s*"([^"]*)"', page)
-    assert links and all(link.startswith("#") for link in links)
-    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
+    pages = pages_of(built(f"prw_{name}.fmu"))
+    assert sum(len(page.encode()) for page in pages.values()) < 400e3
+    ids = {title: re.findall(r'\sid="([^"]+)"', page) for title, page in pages.items()}
+    for title, page in pages.items():
+        etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
+        assert len(ids[title]) == len(set(ids[title])) and {*re.findall(r"url\(#([^)]+)", page)} <= {*ids[title]}
+        assert "<script" not in page and "@import" not in page and "javascript:" not in page
+        links = re.findall(r'(?:href|src)\s*=\s*"([^"]*)"', page)
+        assert links
+        for link in links:
+            other, _, anchor = link.partition("#")
+            assert not anchor or anchor in ids[other or title], link
+            assert not other or other in pages, link
+        assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
 
 
 def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):

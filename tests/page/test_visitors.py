@@ -41,7 +41,8 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     page.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + box["height"] / 2)
     assert clock(page) == pytest.approx(0.75, abs=0.03)
     page.mouse.click(*middle(page.locator(".live-plots canvas:visible").first))
-    assert clock(page) == pytest.approx(0.48, abs=0.03)
+    # The labels of the axis are on the left.
+    assert clock(page) == pytest.approx(0.45, abs=0.05)
     expect(button(page, "Play")).to_be_visible()
     with page.expect_download() as download:
         button(page, "Save as CSV").click()
@@ -109,8 +110,8 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     swipe(touch, motor, (0, 60))
     until(page, "document.querySelector('#live-theta1').value > 10")
     assert page.evaluate("scrollY") == scrolled
-    slider = page.get_by_role("slider", name="Motor 2")
-    slider.scroll_into_view_if_needed()
+    slider = page.get_by_role("slider", name="Motor 2", exact=True)
+    slider.evaluate("slider => slider.scrollIntoView()")
     swipe(touch, middle(slider), (40, 0))
     until(page, "document.querySelector('#live-theta2').value > 10")
 
@@ -135,7 +136,11 @@ def test_with_the_keyboard_only(visit: Any) -> None:
         "[...document.querySelectorAll('.live :is(a, button, input, select, summary, [tabindex])')]"
         ".filter(e => e.checkVisibility({visibilityProperty: true})).map(e => e.id || e.getAttribute('aria-labelledby') || e.getAttribute('aria-label') || e.textContent)"
     )
-    assert list(reached) == list(dict.fromkeys(expected))
+    # A step that comes into the window plays its run.
+    assert [name.replace("Pause", "Play") for name in reached] == [
+        name.replace("Pause", "Play") for name in dict.fromkeys(expected)
+    ]
+    page.get_by_label("Motion", exact=True).select_option("chirp")
     page.get_by_label("Motion", exact=True).focus()
     page.keyboard.press("ArrowDown")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("stop")
@@ -151,7 +156,7 @@ def test_with_the_keyboard_only(visit: Any) -> None:
     page.locator(".live-scene").focus()
     page.keyboard.press("ArrowLeft")
     assert image(page) != before_turn
-    page.get_by_role("slider", name="Motor 1").focus()
+    page.get_by_role("slider", name="Motor 1", exact=True).focus()
     page.keyboard.press("PageUp")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("hand")
 
@@ -161,10 +166,10 @@ def test_with_reduced_motion(visit: Any) -> None:
     button(page, "Play").wait_for()
     page.get_by_label("Motion", exact=True).select_option("move")
     page.wait_for_timeout(400)
-    # The finished run is shown, and plays again on request.
-    assert clock(page) == 1
+    # The finished run is shown at its largest angle, and plays again on request.
+    assert 0.1 < clock(page) < 0.4
     button(page, "Play").click()
-    until(page, "parseFloat(document.querySelector('.live-clock').textContent) < 0.9")
+    until(page, "parseFloat(document.querySelector('.live-clock').textContent) > 0.9")
 
 
 def test_without_scripts_only_the_page_is_shown(visit: Any, address: str) -> None:
@@ -195,7 +200,7 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     expect(field(page, "theta1")).to_have_value("30")
     field(page, "theta1").press("Enter")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("hand")
-    until(page, "document.querySelector('.live-player > .live-plots > figure .live-number').textContent > 29")
+    until(page, "document.querySelector('.live-pane > .live-plots > figure .live-number').textContent > 29")
 
 
 @pytest.mark.parametrize(
@@ -327,7 +332,7 @@ def test_the_gripper_follows_the_hand(visit: Any) -> None:
         # The gripper comes towards the viewer, so in the view from behind the pitch is negative.
         assert (pitch > 10) if turns == 0 else (pitch < -10)
         assert roll_after == pytest.approx(roll, abs=0.5)
-        says = page.locator(".live-what p.live-chosen").inner_text().replace("−", "-")
+        says = page.locator(".live-own .live-what").inner_text().replace("−", "-")
         assert [float(one) for one in re.findall(r"(-?[\d.]+)°", says)] == pytest.approx(
             [pitch, roll_after, theta1, theta2], abs=0.3
         )
@@ -351,18 +356,19 @@ def test_a_motor_at_its_end_stops_the_gripper(visit: Any) -> None:
     theta1, theta2, pitch_after, roll_after = motors_and_wrist(page)
     assert theta1 == pytest.approx(90) and theta2 < 85
     assert pitch_after > pitch + 10 and roll_after == pytest.approx(roll, abs=0.5)
-    expect(page.locator(".live-what p.live-chosen")).to_contain_text("Motor 1 is at its end")
+    expect(page.locator(".live-own .live-what")).to_contain_text("Motor 1 is at its end")
 
 
 def test_numbers_are_as_large_as_a_finger(visit: Any) -> None:
-    """On a touch screen, a number can be grabbed 21 px above and below its middle, in any font, and covers no button."""
+    """On a touch screen, a number can be grabbed 21 px above and below its middle, in any font, and the image does not cover it."""
     page = visit(viewport=PHONE, has_touch=True, is_mobile=True, reduced_motion="reduce")
     for font in ("", "serif", "monospace"):
         page.evaluate(f"document.body.style.fontFamily = '{font}'")
-        x, y = middle(page.locator(".live-what p.live-chosen .live-dial"))
+        page.locator(".live-steps button").nth(1).click()
+        x, y = middle(page.locator(".live-chosen .live-dial"))
         for shift in (-21, 21):
             assert page.evaluate(f"document.elementFromPoint({x}, {y + shift}).className") == "live-dial", (font, shift)
-        above = page.locator(".live-steps button", has_text="5. Controller").bounding_box()
+        above = page.locator(".live-pane").bounding_box()
         assert above and above["y"] + above["height"] <= y - 22, font
 
 
@@ -390,8 +396,8 @@ def test_the_address_and_back(visit: Any) -> None:
     assert "motion=chirp" in page.evaluate("location.hash") and "k1=85.9" in page.evaluate("location.hash")
     assert page.evaluate("history.length") == entries and before <= clock(page) < before + 2
     expect(button(page, "Pause")).to_be_visible()
-    button(page, "3. Resonance").click()
-    button(page, "2. Both motors").click()
+    button(page, "5. Resonance").click()
+    button(page, "3. Both motors").click()
     for motion, pressed, value in [("shake", 1, "2.11"), ("chirp", 0, "1.5")]:
         page.go_back()
         expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
@@ -402,7 +408,7 @@ def test_the_address_and_back(visit: Any) -> None:
     # A link within the page leaves the run as it is.
     frequency = page.get_by_role("slider", name="Frequency")
     frequency.press("ArrowRight")
-    page.get_by_role("link", name="The equations").click()
+    page.get_by_role("link", name="The testbed").click()
     page.go_back()
     expect(frequency).to_have_text("1.05\u00a0Hz")
 
@@ -526,10 +532,11 @@ def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
 
 
 def test_a_link_in_the_page_leads_there(visit: Any) -> None:
-    """The link finds its section, although the browser lays out lower sections only when they become visible."""
+    """The link finds its section in the manual, although the browser lays out lower sections only when they become visible."""
     page = visit()
     button(page, "Pause").click()
     page.get_by_role("link", name="The equations").click()
+    page.wait_for_url("**/manual.html#equations")
     page.wait_for_timeout(300)
     assert page.locator("#equations").evaluate("e => Math.abs(e.getBoundingClientRect().top)") < 60
 

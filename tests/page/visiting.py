@@ -9,8 +9,10 @@ from playwright.sync_api import Locator, Page
 
 
 def page_of(fmu: Path, directory: Path) -> str:
-    """Unpacks the page of an FMU; returns its address."""
+    """Unpacks the pages of an FMU; returns the address of the first one."""
     with zipfile.ZipFile(fmu) as archive:
+        if "documentation/manual.html" in archive.namelist():
+            archive.extract("documentation/manual.html", directory)
         return Path(archive.extract("documentation/index.html", directory)).as_uri()
 
 

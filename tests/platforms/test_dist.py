@@ -38,7 +38,15 @@ def files_except_binaries(name: str) -> dict[str, bytes]:
 
 
 def test_all_files_of_one_version() -> None:
-    expected = {*MODEL_FMUS, SYSTEM, f"{MODEL}.html", f"{MODEL}-cross-check.zip", "RELEASE_NOTES.md", "compilers.txt"}
+    expected = {
+        *MODEL_FMUS,
+        SYSTEM,
+        f"{MODEL}.html",
+        "manual.html",
+        f"{MODEL}-cross-check.zip",
+        "RELEASE_NOTES.md",
+        "compilers.txt",
+    }
     expected |= {SUMS} | {f"{product}{end}" for product in PRODUCTS for end in (".cdx.json", "-third-party.txt")}
     expected |= {path.name for path in (prw_wheel(), *map(wheel, TARGETS))}
     assert {path.name for path in DIST.iterdir()} == expected

@@ -50,9 +50,10 @@ function roundAbove(value) {
 
 /** Rows with a slider and a number field for variables, in the units of the page. */
 class Fields {
-  /** @param {(one: Variable, value: number | string) => void} changed called with values that the type allows */
-  constructor(changed) {
+  /** @param {(one: Variable, value: number | string) => void} changed called with values that the type allows @param {(reason: string) => void} rejected called with the reason why a value is impossible */
+  constructor(changed, rejected = () => {}) {
     this.changed = changed;
+    this.rejected = rejected;
     /** Functions that show the value of a variable. @type {Map<string, (value: number | string) => void>} */
     this.show = new Map();
     /** Functions that mark the field of a variable as invalid with a message, or as valid with "". @type {Map<string, (message: string) => void>} */
@@ -67,7 +68,9 @@ class Fields {
   change(one, value) {
     const reason = this.problem(one, value);
     this.mark.get(one.name)?.(reason);
-    if (!reason) {
+    if (reason) {
+      this.rejected(reason);
+    } else {
       this.changed(one, value);
     }
   }

@@ -62,11 +62,18 @@ class Trial {
     this.choice.addEventListener("change", () => this.visit(this.choice.value));
     this.sliders = new Fields((one, value) => this.byHand({ [one.name]: Number(value) }));
     this.parameters = new Fields((one, value) => {
+      this.guide.warn("");
+      this.guide.answer(this.guide.chosen);
       this.latest = { fields: this.parameters, one, rows: 0, targets: this.session.targets };
       this.session.start.set(one, value);
       this.recalculate();
-    });
-    this.guide = new Guide(this.addOn.lead, this.addOn.guide, (chapter) => this.follow(chapter), (name, value) => this.change(name, value));
+    }, (reason) => this.guide.warn(reason));
+    this.guide = new Guide(this.addOn.lead, this.addOn.guide, (chapter) => this.turnTo(chapter), (name, value) => this.change(name, value));
+    /** The step to which the reader has scrolled; after the last step, its number is the number of steps. */
+    this.reached = 0;
+    /** The image and its plots, which stay in the window while the reader scrolls through the steps, and the part below the steps. */
+    this.pane = element("div", { class: "live-pane" });
+    this.own = element("article", { class: "live-step live-own" });
     this.view = this.addOn.view((...increments) => this.drag(...increments), (name) => this.value(name), (speed) => this.player.setSpeed(speed));
     this.response = this.addOn.response?.((name, value) => this.change(name, value));
     this.player = this.createPlayer();
@@ -84,7 +91,7 @@ class Trial {
       return this.addOn.numbers[name];
     }
     const { session } = this;
-    const own = one.causality === "parameter" ? Number(session.parameter(one)) : session.motion ? session.table.column(name)[session.table.row(this.player.now)] : (session.targets.get(name) ?? startOf(one));
+    const own = one.causality === "parameter" ? Number(session.parameter(one)) : session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? startOf(one));
     return own * one.factor + one.offset;
   }
 
@@ -238,6 +245,7 @@ class Trial {
   drag(...increments) {
     const { session } = this;
     this.isTouched = true;
+    this.guide.answer(this.reached);
     /** @type {Record<string, number>} */
     const values = {};
     const current = (/** @type {string} */ name) => values[name] ?? (session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0));
@@ -299,12 +307,13 @@ class Trial {
     this.rest();
   }
 
-  /** Shows the finished run if the user's system does not allow animations. */
+  /** Shows one image of the run if the user's system does not allow animations: the one that the view chooses, or the last one. */
   rest() {
     const { session, player } = this;
     if (session.motion && !player.isPlaying && !allowsMotion()) {
       session.finish(this.end, this.move);
-      player.now = this.end;
+      player.now = this.view.rest?.(session.table) ?? this.end;
+      this.write();
       player.requestFrame();
     }
   }
@@ -315,11 +324,62 @@ class Trial {
     this.remember(false);
   }
 
-  /** Shows a step of the guide. @param {Chapter} chapter */
-  follow({ settings }) {
-    this.apply(new URLSearchParams(settings));
+  /** Shows a step of the guide with the settings with which the reader has left it. @param {Chapter} chapter @param {boolean} isSame as in `remember` */
+  follow(chapter, isSame) {
+    const last = this.guide.chapters[this.guide.chosen];
+    if (last) {
+      this.guide.left.set(last, String(this.settings()));
+    }
+    this.apply(new URLSearchParams(this.guide.left.get(chapter) ?? chapter.settings));
     this.isTouched = false;
-    this.remember(false);
+    this.remember(isSame);
+  }
+
+  /** Scrolls to a step and shows it. @param {Chapter} chapter */
+  turnTo(chapter) {
+    this.follow(chapter, false);
+    this.scrollTo(this.guide.chapters.indexOf(chapter));
+  }
+
+  /** Scrolls to a step, or to the controls after the last one. @param {number} step */
+  scrollTo(step) {
+    this.reached = step;
+    const part = this.parts()[step].getBoundingClientRect();
+    scrollTo(0, scrollY + part.top - (this.isStacked ? this.pane.offsetHeight : 0) - 8);
+  }
+
+  /** Whether the steps are below the image, as in a narrow window. */
+  get isStacked() {
+    return this.pane.getBoundingClientRect().left < this.own.getBoundingClientRect().right;
+  }
+
+  /** The steps and, after them, the controls. */
+  parts() {
+    return [...this.guide.steps, this.own];
+  }
+
+  /** Shows the step that the reader has scrolled to: the last one that begins in the upper part of the space for text. */
+  scrolled() {
+    const top = this.isStacked ? Math.max(0, this.pane.getBoundingClientRect().bottom) : 0;
+    const line = top + 0.5 * (innerHeight - top);
+    // A reader who uses the controls keeps their run as long as they are in the window.
+    const step = this.parts().filter((part) => part.getBoundingClientRect().top < (part === this.own && this.reached === this.guide.chapters.length ? innerHeight : line)).length - 1;
+    if (step >= 0 && step !== this.reached) {
+      this.reached = step;
+      const chapter = this.guide.chapters[step];
+      if (chapter) {
+        this.follow(chapter, true);
+      }
+    }
+  }
+
+  /** Calculates the runs of all steps, so that their sentences have their numbers before a reader gets there. */
+  rehearse() {
+    for (const { settings } of [...this.guide.chapters].reverse()) {
+      this.apply(new URLSearchParams(settings));
+      this.session.finish(this.end, this.move);
+      this.write();
+    }
   }
 
   /** Puts the settings into the address of the page. @param {boolean} isSame whether the address is changed without a new entry in the browser's history */
@@ -352,6 +412,7 @@ class Trial {
 
   /** Changes a parameter, or a number that motions read. @param {string} name @param {number} value in the unit of the page */
   change(name, value) {
+    this.guide.answer(this.guide.chosen);
     const one = this.description.byName.get(name);
     if (one) {
       this.parameters.show.get(name)?.((value - one.offset) / one.factor);
@@ -364,7 +425,7 @@ class Trial {
 
   /** Shows the values of the numbers in the guide. */
   showNumbers() {
-    this.guide.show.forEach((shown, name) => shown.forEach((show) => show(this.value(name))));
+    this.guide.show[this.guide.chosen]?.forEach((show, name) => show(this.value(name)));
   }
 
   /** Sets all parameters. @param {Record<string, number>} start values that differ from those of the FMU */
@@ -426,14 +487,22 @@ class Trial {
   settle() {
     const settings = /^#try&?(.*)$/.exec(location.hash)?.[1] ?? (location.hash ? null : "");
     if (settings !== null && settings !== this.applied) {
+      const isOpening = this.applied === null;
       this.applied = settings;
-      this.apply(new URLSearchParams(settings));
+      const { chapters } = this.guide;
+      this.apply(new URLSearchParams(settings || chapters[0]?.settings));
+      if (chapters.length && (settings || !isOpening)) {
+        const { chosen } = this.guide;
+        this.scrollTo(chosen < 0 ? chapters.length : chosen);
+      }
     }
   }
 
   /** Applies the settings of a link or a step. All other settings get the values that they had when the page opened. @param {URLSearchParams} settings */
   apply(settings) {
     const { session, addOn, player } = this;
+    // The numbers of the step before stay as they are.
+    this.guide.read(BY_HAND);
     Object.assign(addOn.numbers, this.numbers);
     this.reset(addOn.start);
     this.view.settings?.forEach(({ set, preset }) => set(preset));
@@ -453,6 +522,8 @@ class Trial {
     const speed = settings.get("speed");
     if (speed !== null && this.isSpeed(Number(speed))) {
       player.setSpeed(Number(speed));
+      player.setPlaying(player.isPlaying && allowsMotion());
+      this.rest();
     } else {
       const { isPlaying } = player;
       player.setSpeed(this.pace);
@@ -563,11 +634,10 @@ class Trial {
 
   /** The section at the top of the page. */
   section() {
-    const { description, player, missing } = this;
-    player.stage.append(...(this.view.controls ? [element("div", { class: "live-buttons live-view" }, ...this.view.controls)] : []));
-    player.element.prepend(...this.guide.elements);
-    player.element.append(this.controls());
+    const { description, player, missing, guide, pane, own } = this;
+    const controls = element("div", { class: "live-buttons live-view" }, ...(this.view.controls ?? []));
     player.plots.element.prepend(...(this.response ? [this.response.element] : []));
+    const isTold = guide.chapters.length > 0;
     const about = element(
       "p",
       { class: "live-about" },
@@ -576,12 +646,32 @@ class Trial {
       `.${missing.length ? ` This page does not contain ${missing.join(", ")} (too large). Results that depend on them differ from those of other tools.` : ""}`,
     );
     const isPlain = addOns[description.identifier] === undefined;
-    const section = element(
-      "section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), player.element,
-      ...(this.settable.length && !this.isShort ? [this.fields()] : []), ...(isPlain ? [tableOfVariables(description)] : []), about,
-    );
+    const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), player.element);
+    const more = [...(this.settable.length && !this.isShort ? [this.fields()] : []), ...(isPlain ? [tableOfVariables(description)] : []), about];
+    if (isTold) {
+      player.element.classList.add("live-told");
+      player.plots.isRow = true;
+      const all = this.button("All plots", () => pane.classList.toggle("live-all"));
+      all.classList.add("live-narrow");
+      controls.append(all);
+      pane.append(player.stage, player.plots.element);
+      own.append(element("h3", {}, "Your turn"), guide.lead, controls, this.controls(), ...more);
+      player.element.append(guide.navigation, pane, element("div", { class: "live-story" }, ...guide.steps, own));
+      for (const kind of ["pointerdown", "keydown", "input", "change"]) {
+        own.addEventListener(kind, () => (this.reached = guide.chapters.length));
+      }
+      // A control that gets the focus is not scrolled below the image.
+      new ResizeObserver(() => (document.documentElement.style.scrollPaddingTop = this.isStacked ? `${pane.offsetHeight + 8}px` : "")).observe(pane);
+      addEventListener("scroll", () => requestAnimationFrame(() => this.scrolled()), { passive: true });
+    } else {
+      player.stage.append(...(this.view.controls ? [controls] : []));
+      player.element.prepend(...(this.addOn.lead.length ? [guide.lead] : []));
+      player.element.append(this.controls());
+      section.append(...more);
+    }
     for (const kind of ["pointerdown", "keydown"]) {
-      section.addEventListener(kind, () => (this.isTouched = true), { capture: true });
+      // A finger on a paragraph only scrolls.
+      section.addEventListener(kind, ({ target }) => (this.isTouched ||= target instanceof Element && target.closest(".live-pane, .live-stage, .live-plots, .live-dial, button, input, select, summary") !== null), { capture: true });
     }
     return section;
   }
@@ -612,6 +702,7 @@ async function live(packed, resources, missing) {
   const [own, ...others] = await Promise.all(packed.map((one, index) => decompressPackage(one, index ? {} : resources)));
   const trial = new Trial(own, others, missing);
   const section = trial.section();
+  trial.rehearse();
   const { stopTime, startTime, identifier } = own.description;
   if (addOns[identifier] === undefined && !(stopTime - startTime < 60 && stopTime - startTime > 1)) {
     trial.pace = (stopTime - startTime) / 10;

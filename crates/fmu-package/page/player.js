@@ -1,8 +1,8 @@
 // Plays a run: a view, plots, and a bar with a button, a time slider and the speed.
 
 /**
- * An image of the model at one time, next to the plots.
- * @typedef {{element: HTMLElement, draw(table: Table, time: number, caption?: string): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
+ * An image of the model at one time, next to the plots. `rest` returns the time that shows a run best in one image, s.
+ * @typedef {{element: HTMLElement, draw(table: Table, time: number, caption?: string): void, set?(parameters: (name: string) => number): void, rest?(table: Table): number}} View
  */
 
 /** Whether the user's system allows animations. */

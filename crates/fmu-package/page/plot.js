@@ -154,6 +154,8 @@ class Plots {
   /** @param {Panel[]} panels @param {(time: number) => void} seek called with the time where a panel is touched @param {string} axis label of the abscissa */
   constructor(panels, seek, axis = "time (s)") {
     this.axis = axis;
+    /** Whether the panels are next to each other, so that each names the axis. */
+    this.isRow = false;
     this.panels = panels.map((panel) => this.panel(panel, seek));
     this.element = element("div", { class: "live-plots" }, ...this.panels.map((panel) => panel.figure));
     this.span = { begin: 0, end: 1 };
@@ -186,7 +188,7 @@ class Plots {
         seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
       }
     });
-    return { panel, canvas, keys, other, figure: element("figure", {}, caption, canvas) };
+    return { panel, canvas, keys, other, figure: element("figure", panel.isNoted ? { class: "live-noted" } : {}, caption, canvas) };
   }
 
   /** @param {number} x @param {number} width */
@@ -222,7 +224,7 @@ class Plots {
       isNamed ||= isApart;
       panel.other.hidden = !isApart;
       panel.other.textContent = other?.label ?? "";
-      this.drawPanel(panel, axes[index], table, now, index === this.panels.length - 1, other, panel.panel.isNoted ? notes : []);
+      this.drawPanel(panel, axes[index], table, now, this.isRow || index === this.panels.length - 1, other, panel.panel.isNoted ? notes : []);
     }
   }
 

@@ -1,4 +1,4 @@
-//! The pages of the testbed and of its controller: `documentation/index.html` in their FMUs. They are put together from the text,
+//! The pages of the testbed and of its controller: `documentation/index.html` in their FMUs, and `manual.html` next to it. They are put together from the text,
 //! figures and numbers in `docs/fmu-page`, the tables in `docs`, and the model description of the FMU that is built.
 
 mod formulas;
@@ -26,17 +26,31 @@ pub const WRIST: [&str; 3] = [
     include_str!("../../../docs/fmu-page/wrist/view.js"),
 ];
 
-/// Returns the testbed's page for the FMU with this model description of FMI 2.0.
+/// Returns the testbed's first page for the FMU with this model description of FMI 2.0. It tells what the testbed is; the story of the
+/// machine is added to it by the scripts that run the FMU.
 ///
 /// # Errors
 /// When a source is missing or faulty; the message names it.
 ///
 /// ```
 /// let description = std::fs::read_to_string("../../modelDescription/modelDescription.xml").unwrap();
-/// assert!(prw_page::testbed(&description).unwrap().contains("<td><code>theta1</code></td><td>rad</td>"));
+/// assert!(prw_page::testbed(&description).unwrap().contains("<a href=\"manual.html#equations\">"));
 /// ```
 pub fn testbed(description: &str) -> Result<String> {
-    page("testbed", description)
+    page("testbed", Part::First, description)
+}
+
+/// Returns the testbed's manual for the FMU with this model description of FMI 2.0.
+///
+/// # Errors
+/// When a source is missing or faulty; the message names it.
+///
+/// ```
+/// let description = std::fs::read_to_string("../../modelDescription/modelDescription.xml").unwrap();
+/// assert!(prw_page::manual(&description).unwrap().contains("<td><code>theta1</code></td><td>rad</td>"));
+/// ```
+pub fn manual(description: &str) -> Result<String> {
+    page("testbed", Part::Manual, description)
 }
 
 /// Returns the controller's page for the FMU with this model description of FMI 2.0.
@@ -49,7 +63,17 @@ pub fn testbed(description: &str) -> Result<String> {
 /// assert!(prw_page::controller(&description).unwrap().contains("<td><code>pitch_ref</code></td><td>rad</td>"));
 /// ```
 pub fn controller(description: &str) -> Result<String> {
-    page("controller", description)
+    page("controller", Part::Whole, description)
+}
+
+/// The part of a document that a page contains.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Whole,
+    /// The first section, and links to the others.
+    First,
+    /// All sections but the first.
+    Manual,
 }
 
 /// A section of a page.
@@ -62,21 +86,38 @@ struct Section {
 }
 
 /// Builds a page from the files in one directory of `text` and from the model description.
-fn page(directory: &str, description: &str) -> Result<String> {
+fn page(directory: &str, part: Part, description: &str) -> Result<String> {
     let document = Document::parse(description).context("the model description is not XML")?;
     let root = document.root_element();
     let attribute = |name| root.attribute(name).unwrap_or_default();
     let environment = environment(&document)?;
     let sections = section_files(&source("text").join(directory))?;
     let sections: Vec<_> = sections.iter().map(|path| section(&environment, path)).collect::<Result<_>>()?;
-    let [header, sections @ ..] = &sections[..] else { bail!("{directory} has no text") };
+    let [header, all @ ..] = &sections[..] else { bail!("{directory} has no text") };
+    let (first, rest) = all.split_at(all.len().min(1));
+    let links = |sections: &[Section], page: &str| -> Vec<(String, String)> {
+        sections.iter().map(|one| (format!("{page}#{}", one.anchor), one.title.clone())).collect()
+    };
+    let (sections, links) = match part {
+        Part::Whole => (all, links(all, "")),
+        Part::First => (first, [links(first, ""), links(rest, "manual.html")].concat()),
+        Part::Manual => (rest, links(rest, "")),
+    };
+    let (title, lead) = match part {
+        Part::Manual => (
+            format!("{}: the manual", header.title),
+            "<p><a href=\"index.html\">The machine, and this FMU running in the browser</a></p>".to_owned(),
+        ),
+        _ => (header.title.clone(), header.text.clone()),
+    };
     let template = read(&source("page.html"))?;
     let page = environment.render_str(
         &template,
         context! {
             style => read(&source("style.css"))?,
-            title => header.title,
-            lead => header.text,
+            title => title,
+            lead => lead,
+            links => links,
             version => escape(attribute("version")),
             license => escape(attribute("license")),
             sections => sections.iter().map(|one| (&one.anchor, &one.title, &one.text)).collect::<Vec<_>>(),

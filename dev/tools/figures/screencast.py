@@ -18,7 +18,7 @@ from prw.files import replacing
 #: Duration of each frame, ms, and the number of mouse movements in a frame.
 STAY, SUBSTEPS = 100, 5
 #: Size of the window and width of the GIF, px.
-WINDOW, WIDTH = (1000, 760), 640
+WINDOW, WIDTH = (1280, 760), 640
 #: Movements of the mouse: number of frames, whether the button is down, and the distance to the right and down, px.
 GESTURES = (
     (4, False, (0, 0)),
@@ -67,7 +67,7 @@ def record(fmu: Path, path: Path) -> None:
 
 def _frames(page: Any) -> list[Image.Image]:
     """The frames of the gestures, with the pointer."""
-    boxes = [page.locator(selector).first.bounding_box() for selector in (".live-scene", ".live-player > .live-plots")]
+    boxes = [page.locator(selector).first.bounding_box() for selector in (".live-scene", ".live-pane > .live-plots")]
     left, top = (min(box[axis] for box in boxes) - 6 for axis in ("x", "y"))
     right, bottom = (
         max(box[axis] + box[size] for box in boxes) + 6 for axis, size in (("x", "width"), ("y", "height"))

@@ -3,7 +3,7 @@
 /** Pole of pitch with the parameters of Table 1, 1/s, for the input shaper. */
 const PITCH_POLE = { real: -9.683, imaginary: 34.678 };
 /** Numbers that the guide changes: angles of the motors (deg), frequency of the vibration (Hz), goals of the controller and slip of motor 2 (deg). */
-const NUMBERS = { alone: 20, angle: 40, frequency: 1, pitch_goal: 25, roll_goal: 50, slip: 8 };
+const NUMBERS = { cam: 40, alone: 20, angle: 40, frequency: 1, pitch_goal: 25, roll_goal: 50, slip: 8 };
 /** Angle of the fast move, deg, its duration, and the times at which it begins: in one go, and in two parts, s. */
 const FAST = { angle: 20, duration: 0.1, begin: 0.1, again: 1.9 };
 /** Time between the two parts of the shaped move: half a swing, s. Share of the second part. */
@@ -12,8 +12,10 @@ const [HALF_SWING, SECOND_SHARE] = shaper();
 const BAND = [0.5, 15, 0.05];
 /** Largest angle of a motor that is moved by hand, rad. */
 const REACH = Math.PI / 2;
-/** Time at which motor 1, alone, is fastest; time at which motor 2 slips; and time at which the errors of the loop are stated, s. */
-const [FASTEST, SLIPS, LATE] = [0.5, 1.5, 3.3];
+/** Times at which motor 1, alone, begins to turn and stops, s. */
+const ALONE_MOVES = [0.2, 0.9];
+/** Time at which motor 2 slips, and time at which the errors of the loop are stated, s. */
+const [SLIPS, LATE] = [1.5, 3.3];
 /** Integral gain of the controller in the loop, 1/s. With its own gain, 3, a visitor would wait long for the end of a correction. */
 const GAIN = 20;
 /** Double pole with which the motors follow the sliders, 1/s. */
@@ -41,10 +43,10 @@ function both([theta, omega], second = 1) {
   return [theta, second * theta, omega, second * omega];
 }
 
-/** To one side, to the other side, and back. @param {number} time */
-function swing(time) {
+/** To one side, to the other side, and back. @param {number} time @param {number} angle deg */
+function swing(time, angle = NUMBERS.angle) {
   const [first, second, third] = [quintic(time, 0.7), quintic(time - 0.7, 1), quintic(time - 1.7, 0.7)];
-  return [0, 1].map((k) => NUMBERS.angle * (first[k] - 2 * second[k] + third[k]));
+  return [0, 1].map((k) => angle * (first[k] - 2 * second[k] + third[k]));
 }
 
 /** The motion of Fig. 4 (Sec. 4): a rate of sin(10 pi t) rad/s. @param {number} time */
@@ -81,17 +83,24 @@ function stops(time) {
 
 /** Motor 1 turns, stays, and turns back. @param {number} time */
 function alone(time) {
-  const [there, back] = [quintic(time - 0.2, 0.7), quintic(time - 2, 0.7)];
+  const [begin, end] = ALONE_MOVES;
+  const [there, back] = [quintic(time - begin, end - begin), quintic(time - 2, end - begin)];
   return [0, 1].map((k) => NUMBERS.alone * (there[k] - back[k]));
+}
+
+/** Both discs turn together, and then against each other. @param {number} time @param {number} angle deg @returns {[number, number, number, number]} */
+function tour(time, angle) {
+  return time < 2.5 ? both(swing(time, angle)) : both(swing(time - 2.6, angle), -1);
 }
 
 /** @type {Motion[]} */
 const MOTIONS = [
+  { ...motorMotion("cam", "The cam: both discs the same way, then against each other", 5.2, (time) => tour(time, NUMBERS.cam)), notes: [[1.2, "same way: pitch"], [3.8, "against: roll"]] },
   motorMotion("one", "Motor 1 turns, motor 2 stands still", 3, (time) => {
     const [theta, omega] = alone(time);
     return [theta, 0, omega, 0];
   }),
-  { ...motorMotion("tour", "Both motors: equal angles pitch, opposite angles roll", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))), notes: [[1.2, "together: pitch"], [3.8, "against each other: roll"]] },
+  { ...motorMotion("tour", "Both motors: equal angles pitch, opposite angles roll", 5.2, (time) => tour(time, NUMBERS.angle)), notes: [[1.2, "together: pitch"], [3.8, "against: roll"]] },
   motorMotion("pitch", "Pitch: equal motor angles", 2.6, (time) => both(swing(time))),
   motorMotion("roll", "Roll: opposite motor angles", 2.6, (time) => both(swing(time), -1)),
   motorMotion("fig4", "The paper\u2019s Fig. 4: opposite rates, sin(10\u03c0t) rad/s", 2, (time) => both(sine(time), -1)),
@@ -118,7 +127,7 @@ class Resonance {
     const find = (/** @type {string} */ name) => /** @type {Variable} */ (own.description.byName.get(name));
     this.motors = this.fmu.group(MOTORS.map(find));
     this.pitch = this.fmu.group([find("pitch")]);
-    this.plots = new Plots([{ title: "Swing of the wrist, as a multiple of the motors\u2019", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
+    this.plots = new Plots([{ title: "Swing, relative to the motors", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
     this.element = this.plots.element;
     this.key = "";
     /** Responses with the parameters as the page opens, and with the current parameters. @type {(Table | undefined)[]} */
@@ -272,6 +281,6 @@ addOns.prw_testbed = (own, others) => {
         // The inverse of eq. (1): the motor angles of a pitch and a roll angle.
         const half = (value("M") / value("N")) * roll;
         turn(...(theta1 ? [{ theta1 }] : theta2 ? [{ theta2 }] : [{ theta1: pitch, theta2: pitch }, { theta1: half, theta2: -half }]));
-      }, ["motors", "gripper"], pace),
+      }, ["motors", "gripper"], pace, "k2"),
   };
 };

@@ -1,20 +1,30 @@
 // The wrist as the view of a page that runs an FMU: the image, and controls for what it shows.
 
+/** The time at which the wrist is farthest from where it starts, s. @param {Table} table */
+function farthest(table) {
+  const [pitch, roll] = ["pitch", "roll"].map((name) => table.column(name));
+  let most = 0;
+  for (let row = 1; row < table.count; row++) {
+    most = Math.abs(pitch[row]) + Math.abs(roll[row]) > Math.abs(pitch[most]) + Math.abs(roll[most]) ? row : most;
+  }
+  return table.column("time")[most];
+}
+
 /**
- * The view. Its function `set` takes the numbers of lobes and rollers from the parameters M and N.
+ * The view. `stiffness` names the parameter of the couplings next to the wrist. Its function `set` takes the numbers of lobes and rollers from the parameters M and N.
  * @param {Move} move @param {("motors" | "gripper")[]} handles parts that can be dragged @param {(speed: number) => void} pace sets the speed of the run
  */
-function wristView(move, handles, pace) {
+function wristView(move, handles, pace, stiffness = "") {
   // From the front and from above, so that pitch moves the gripper down and up, as the pointer that drags it.
   const wrist = new Wrist({ ...WRIST, azimuth: -82, elevation: 24 }, move, handles);
   const inside = element("button", { type: "button", "aria-pressed": "false" }, "Look inside");
-  const lookInside = (/** @type {boolean} */ isInside) => {
-    inside.setAttribute("aria-pressed", String(isInside));
-    wrist.lookInside(isInside);
+  const look = (/** @type {Focus} */ focus) => {
+    inside.setAttribute("aria-pressed", String(focus === "torques"));
+    wrist.look(focus);
   };
   inside.addEventListener("click", () => {
-    lookInside(!wrist.isInside);
-    pace(wrist.isInside ? 0.2 : 1);
+    look(wrist.focus === "torques" ? "" : "torques");
+    pace(wrist.focus ? 0.2 : 1);
   });
   const boxes = Object.entries(PARTS_SHOWN).map(([part, label]) => {
     const box = element("input", { type: "checkbox", checked: "", "data-part": part });
@@ -38,11 +48,12 @@ function wristView(move, handles, pace) {
       wrist.enlarge(Number(value));
       return true;
     } }],
-    ["inside", { preset: "0", value: () => String(Number(wrist.isInside)), set: (value) => {
-      if (value !== String(Number(wrist.isInside))) {
-        lookInside(value === "1");
+    ["look", { preset: "", value: () => wrist.focus, set: (value) => {
+      const isKnown = !value || value in CLOSE;
+      if (isKnown && value !== wrist.focus) {
+        look(/** @type {Focus} */ (value));
       }
-      return value === "0" || value === "1";
+      return isKnown;
     } }],
     ["off", { preset: "", value: off, set: (value) => {
       const names = value ? value.split(" ") : [];
@@ -59,7 +70,11 @@ function wristView(move, handles, pace) {
       wrist.caption = caption;
       wrist.draw(table, time);
     },
-    set: (/** @type {(name: string) => number} */ parameter) => wrist.count(parameter("M"), parameter("N")),
+    rest: farthest,
+    set: (/** @type {(name: string) => number} */ parameter) => {
+      wrist.stiffness = stiffness ? parameter(stiffness) : 0;
+      wrist.count(parameter("M"), parameter("N"));
+    },
     controls: [inside, parts],
     settings,
   };

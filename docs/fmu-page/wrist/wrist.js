@@ -4,8 +4,11 @@
  * A face of a body: indices of its corners, its colour, and whether only its outside is visible.
  * @typedef {{corners: number[], colour: number[], isClosed: boolean}} Face
  * A body: the angle that turns it, the part of the machine, the torque that colours it in the close view, and whether the close view is cut open there.
- * @typedef {{points: number[], faces: Face[], turn: string, part: string, torque?: string, isCut?: boolean}} Solid
+ * `side` is the side of a part that only motor 1 (-1) or motor 2 (1) has.
+ * @typedef {{points: number[], faces: Face[], turn: string, part: string, torque?: string, isCut?: boolean, side?: number}} Solid
  * @typedef {{part: string, turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
+ * What the image shows: the machine; the cam with its rollers from close by, with or without the colours of their torques; or the couplings of motor 1.
+ * @typedef {"" | "torques" | "cam" | "coupling"} Focus
  * A body on the graphics card: corners and normals of its triangles, and the number of corners.
  * @typedef {{buffer: WebGLBuffer, count: number, body: Solid}} Mesh
  */
@@ -29,8 +32,12 @@ const SHAFTS = [
 ];
 /** The parts of the machine, with their labels. */
 const PARTS_SHOWN = { motors: "motors", couplings: "couplings", carriers: "carriers with rollers", cam: "cam", ring: "ring", gripper: "gripper" };
-/** The parts in the close view, which is cut open: without the upper arc of the ring. */
-const INSIDE = ["carriers", "cam", "ring"];
+/** The parts in the close views. The ring is cut open: without its upper arc. */
+const CLOSE = { torques: ["carriers", "cam", "ring"], cam: ["carriers", "cam"], coupling: ["couplings"] };
+/** Azimuth and elevation of the close views, deg. */
+const ANGLES = { torques: [18, 38], cam: [18, 30], coupling: [34, 24] };
+/** Position of the coupling next to the wrist, of motor 1. */
+const COUPLING = -2.2;
 const DEGREE = Math.PI / 180;
 
 /** @type {Panel[]} */
@@ -97,7 +104,7 @@ function bodies(parts, waves) {
     const turn = (/** @type {string | null | undefined} */ name) => (name ? shaft[/** @type {"motor"} */ (name)] : "");
     for (const shape of parts.side) {
       const mirrored = { ...shape, turns: turn(shape.turns), lathe: shape.lathe?.map(([x, radius]) => [shaft.side * x, radius]) };
-      all.push({ ...lathe(mirrored, shaft.colour), torque: shape.part === "carriers" ? shaft.torque : undefined });
+      all.push({ ...lathe(mirrored, shaft.colour), torque: shape.part === "carriers" ? shaft.torque : undefined, side: shaft.side });
     }
     all.push({ ...rollers(parts, shaft.side, rgb(parts.rollers.colour)), turn: shaft.carrier, part: "carriers", torque: shaft.torque });
   }
@@ -251,8 +258,10 @@ class Wrist {
     this.isHinting = move !== null;
     /** Parts that are switched off. @type {Set<string>} */
     this.off = new Set();
-    /** Whether the cam and its rollers are shown from close by, cut open, in the colours of their torques. */
-    this.isInside = false;
+    /** @type {Focus} */
+    this.focus = "";
+    /** Stiffness of the couplings next to the wrist, N.m/rad. */
+    this.stiffness = 0;
     /** A line above the machine. */
     this.caption = "";
     this.shaded = Shaded.make();
@@ -268,6 +277,8 @@ class Wrist {
     this.settled = { key: "", factor: 1 };
     /** The largest torque of a run, N.m. */
     this.hottest = { key: "", most: 1 };
+    /** The largest torque of a spring or damper in a run, N.m. */
+    this.pushed = { key: "", most: 1 };
     this.count(LOBES, parts.rollers.count);
   }
 
@@ -279,11 +290,10 @@ class Wrist {
     this.turn(0, 0);
   }
 
-  /** Shows the cam and its rollers from close by, or the whole machine. @param {boolean} isInside */
-  lookInside(isInside) {
-    this.isInside = isInside;
-    this.elevation = isInside ? 38 : this.parts.elevation;
-    this.azimuth = isInside ? 18 : this.parts.azimuth + 90;
+  /** Shows a part from close by, or the whole machine. @param {Focus} focus */
+  look(focus) {
+    this.focus = focus;
+    [this.azimuth, this.elevation] = focus ? ANGLES[focus] : [this.parts.azimuth + 90, this.parts.elevation];
     this.turn(0, 0);
   }
 
@@ -294,8 +304,8 @@ class Wrist {
   }
 
   /** Whether a body is in the image. @param {Solid} body */
-  isShown({ part, isCut }) {
-    return !this.off.has(part) && (!this.isInside || (INSIDE.includes(part) && !isCut));
+  isShown({ part, isCut, side }) {
+    return !this.off.has(part) && (!this.focus || (CLOSE[this.focus].includes(part) && !isCut && (this.focus !== "coupling" || side === -1)));
   }
 
   /** What the pointer would grab at a position on the canvas: a motor, the gripper, or nothing. @param {number} x @param {number} y @returns {typeof SHAFTS[number] | "gripper" | null} */
@@ -440,8 +450,12 @@ class Wrist {
     const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
     const rotation = multiplied([1, 0, 0, 0, ce, -se, 0, se, ce], [ca, 0, -sa, 0, 1, 0, sa, 0, ca]);
     const { width, height } = sizeOf(this.element);
-    if (this.isInside) {
-      const scale = Math.min(width / 3.4, height / 2.2);
+    if (this.focus === "coupling") {
+      const [scale, size] = [Math.min(width / 3, height / 2.1), DISTANCE / (DISTANCE - rotation[6] * COUPLING)];
+      return { rotation, scale, centre: [0.5 * width - size * scale * rotation[0] * COUPLING, 0.56 * height + size * scale * rotation[3] * COUPLING] };
+    }
+    if (this.focus) {
+      const scale = this.focus === "cam" ? Math.min(width / 4.2, height / 2.7) : Math.min(width / 3.4, height / 2.2);
       return { rotation, scale, centre: [0.5 * width, 0.5 * height + 0.42 * scale * ce] };
     }
     return { rotation, scale: Math.min(width / 10.3, height / 5.2), centre: [0.47 * width, 0.53 * height] };
@@ -457,14 +471,51 @@ class Wrist {
     const twist = this.factor(table);
     const couplings = this.couplings(angle, twist).filter((body) => this.isShown(body));
     const isShown = (/** @type {Solid} */ body) => this.isShown(body);
-    const warmth = this.isInside ? this.warmth(table, time) : () => 0;
+    const warmth = this.focus === "torques" ? this.warmth(table, time) : () => 0;
     const image = this.shaded?.draw({ width, height, rotation, scale, centre, turns, lamp: this.parts.lamp }, couplings, isShown, warmth);
     if (image) {
       pen.drawImage(image, 0, 0, width, height);
     } else {
       this.paint(pen, { rotation, scale, centre }, turns, [...this.bodies.filter(isShown), ...couplings], warmth);
     }
+    if (this.focus === "coupling") {
+      this.arcs(pen, table, time);
+    }
     this.label(pen, width, height, twist, (name) => table.at(name, time));
+  }
+
+  /** The torques that the spring and the damper of the coupling transmit, N.m. The shaft before it has no inertia, so their sum is the sensor's torque, eq. (9). @param {(name: string) => number} at */
+  torques(at) {
+    const spring = this.stiffness * (at("theta3") - at("theta5"));
+    return [spring, -at("tau1") - spring];
+  }
+
+  /** Draws these torques as arrows around the coupling, in relation to the largest one of the run. @param {CanvasRenderingContext2D} pen @param {Table} table @param {number} time */
+  arcs(pen, table, time) {
+    const key = `${table.count} ${table.column("tau1")[table.count - 1]} ${this.stiffness}`;
+    if (key !== this.pushed.key) {
+      let most = 1e-6;
+      for (let row = 0; row < table.count; row++) {
+        most = Math.max(most, ...this.torques((name) => table.column(name)[row]).map(Math.abs));
+      }
+      this.pushed = { key, most };
+    }
+    this.torques((name) => table.at(name, time)).forEach((torque, index) => {
+      const [radius, turn] = [0.62 + 0.2 * index, (2.6 * torque) / this.pushed.most];
+      const at = (/** @type {number} */ angle, /** @type {number} */ far) => this.project([COUPLING, far * Math.cos(angle), far * Math.sin(angle)]);
+      const steps = Array.from({ length: 25 }, (_, step) => at((turn * step) / 24, radius));
+      pen.strokeStyle = pen.fillStyle = colourAt(this.element, FORCES[index].colour);
+      pen.lineWidth = 5;
+      pen.beginPath();
+      steps.forEach(([x, y]) => pen.lineTo(x, y));
+      pen.stroke();
+      if (Math.abs(turn) > 0.05) {
+        const [tip, inner, outer] = [at(turn + 0.14 * Math.sign(turn), radius), at(turn, radius - 0.07), at(turn, radius + 0.07)];
+        pen.beginPath();
+        [tip, inner, outer].forEach(([x, y]) => pen.lineTo(x, y));
+        pen.fill();
+      }
+    });
   }
 
   /** The share of the warm colour in a body: its torque, in relation to the largest one of the run. @param {Table} table @param {number} time @returns {(body: Solid) => number} */
@@ -491,7 +542,7 @@ class Wrist {
         const points = strands(this.parts, x.map((axial) => shaft.side * axial), outer, inner, twist);
         const colour = channels(this.parts.colours[shaft.colour]);
         const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
-        return { points, faces, turn: "", part: "couplings" };
+        return { points, faces, turn: "", part: "couplings", side: shaft.side };
       }),
     );
   }
@@ -582,14 +633,20 @@ class Wrist {
       pen.textAlign = align;
       pen.fillStyle = colourAt(this.element, colour);
       const half = align === "center" ? pen.measureText(text).width / 2 + 4 : 0;
-      const left = Math.min(Math.max(x, half), width - half);
+      const left = align === "left" ? Math.min(x, width - pen.measureText(text).width - 4) : Math.min(Math.max(x, half), width - half);
       pen.strokeText(text, left, y);
       pen.fillText(text, left, y);
     };
     const isOn = (/** @type {string} */ part) => !this.off.has(part);
-    if (this.isInside) {
+    if (this.focus === "coupling") {
+      this.torques(at).forEach((torque, index) => label(`${FORCES[index].name} ${format(torque, this.pushed.most)} N\u00b7m`, [8, 20 + 18 * index], FORCES[index].colour, "left"));
+      label("to motor 1", this.project([-3.3, -0.75, 0]), "text-1", "center");
+      label("to the wrist", this.project([-1.75, -0.62, 0]), "soft", "center");
+    } else if (this.focus) {
       const torques = SHAFTS.map(({ torque }) => `${format(at(torque), this.hottest.most)}`);
-      label(`the redder, the more torque: motor 1 ${torques[0]}, motor 2 ${torques[1]} N\u00b7m`, [8, 20], "soft", "left");
+      if (this.focus === "torques") {
+        label(`the redder, the more torque: motor 1 ${torques[0]}, motor 2 ${torques[1]} N\u00b7m`, [8, 20], "soft", "left");
+      }
       if (isOn("carriers")) {
         SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 1.5, 0.24, 0]), `text-${index + 1}`, "center"));
       }
@@ -616,7 +673,7 @@ class Wrist {
       label(this.caption, [8, height - 12], "ink", "left");
     }
     // In a narrow image, the caption takes the space of the hint.
-    if (this.isHinting && !this.isInside && this.handles.length && !(this.caption && width < 480)) {
+    if (this.isHinting && !this.focus && this.handles.length && !(this.caption && width < 480)) {
       label(this.handles.length > 1 ? "Drag the gripper or a motor" : `Drag the ${this.handles[0]}`, [this.caption ? width - 10 : width / 2, height - 12], "ink", this.caption ? "right" : "center");
     }
   }
@@ -737,6 +794,8 @@ function triangles({ points, faces }) {
   return Float32Array.from(all);
 }
 
+/** The torques of a coupling: names, and the colours of their arrows. */
+const FORCES = [{ name: "spring", colour: "text-3" }, { name: "damper", colour: "text-2" }];
 /** Colour of the largest torque. */
 const WARM = [214, 32, 32];
 /** Distance from the viewer to the centre, and the number of cam lobes until the FMU is read. */

@@ -34,6 +34,8 @@ pub struct Page {
     /// Writes `documentation/index.html` from the model description for FMI 2.0, if the page has tables of the variables or is put
     /// together from several files. By default, the page is the file of this name among the content, if there is one.
     pub html: Option<fn(&str) -> Result<String>>,
+    /// Writes other pages, such as `manual.html`, in the same way. They do not run the FMU.
+    pub others: Vec<(&'static str, fn(&str) -> Result<String>)>,
     /// Scripts that run after the scripts that every page has. One of them registers an add-on under the model's identifier.
     pub scripts: Vec<&'static str>,
     /// Packages in the same workspace whose FMUs the page contains, so that these scripts can run them together with the model, for
@@ -46,6 +48,7 @@ pub(crate) struct Paged<'a> {
     pub described: Described,
     /// The page without the part that runs the FMU.
     written: Option<String>,
+    others: Files,
     compiled: Option<CompiledPage<'a>>,
 }
 
@@ -58,11 +61,12 @@ pub(crate) fn page<'a>(plan: &Plan<'a>, Checked(described): Checked) -> Result<P
     // The page runs the FMU for FMI 2.0.
     let description = described.fmi2.as_ref().unwrap_or(&described.descriptions[0].1);
     let written = page.written(description, &plan.content)?;
+    let others = page.written_others(description)?;
     let compiled = match &described.fmi2 {
         Some(description) if plan.with_page => page.compile(&plan.build(), description.clone())?,
         _ => None,
     };
-    Ok(Paged { written, compiled, described })
+    Ok(Paged { written, others, compiled, described })
 }
 
 impl Paged<'_> {
@@ -87,6 +91,7 @@ impl Paged<'_> {
             None => self.written.clone().map(String::into_bytes),
         };
         files.extend(html.map(|html| (PAGE.to_owned(), html)));
+        files.extend(self.others.iter().cloned());
         Ok(files)
     }
 }
@@ -108,6 +113,14 @@ impl Page {
             }
             (None, None) => Ok(None),
         }
+    }
+
+    /// Returns the other pages: their names in the FMU, and their contents.
+    fn written_others(&self, description: &str) -> Result<Files> {
+        let write = |(name, html): &(&str, fn(&str) -> Result<String>)| {
+            Ok((format!("documentation/{name}"), html(description)?.into_bytes()))
+        };
+        self.others.iter().map(write).collect()
     }
 
     /// Compiles the model and its companions for WebAssembly. If the model cannot be compiled for WebAssembly, prints a note and returns
