@@ -32,6 +32,7 @@ fn builder(directory: PathBuf) -> Builder {
             scripts: [&prw_page::WRIST[..], &[include_str!("../../docs/fmu-page/wrist/controller.js")]]
                 .concat(),
             companions: vec!["prw_testbed"],
+            ..Page::default()
         },
         ..Builder::new("prw_controller", directory)
     }
