@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use fmu_test_kit::models;
+#[allow(dead_code, reason = "only the tests of the call table let arrays overlap")]
 #[path = "boundary/valid_calls.rs"]
 mod valid_calls;
 

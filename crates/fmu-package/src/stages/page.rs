@@ -17,6 +17,9 @@ use anyhow::{Context, Result};
 use std::fs;
 use std::path::Path;
 
+/// Returns a page for the FMU with this model description.
+type Write = fn(&str) -> Result<String>;
+
 /// The page of an FMU, and additions to its part that runs the FMU in a browser. Without additions, that part has plots and
 /// sliders, but not a view of the model.
 ///
@@ -33,9 +36,9 @@ use std::path::Path;
 pub struct Page {
     /// Writes `documentation/index.html` from the model description for FMI 2.0, if the page has tables of the variables or is put
     /// together from several files. By default, the page is the file of this name among the content, if there is one.
-    pub html: Option<fn(&str) -> Result<String>>,
+    pub html: Option<Write>,
     /// Writes other pages, such as `manual.html`, in the same way. They do not run the FMU.
-    pub others: Vec<(&'static str, fn(&str) -> Result<String>)>,
+    pub others: Vec<(&'static str, Write)>,
     /// Scripts that run after the scripts that every page has. One of them registers an add-on under the model's identifier.
     pub scripts: Vec<&'static str>,
     /// Packages in the same workspace whose FMUs the page contains, so that these scripts can run them together with the model, for
@@ -117,7 +120,7 @@ impl Page {
 
     /// Returns the other pages: their names in the FMU, and their contents.
     fn written_others(&self, description: &str) -> Result<Files> {
-        let write = |(name, html): &(&str, fn(&str) -> Result<String>)| {
+        let write = |(name, html): &(&str, Write)| {
             Ok((format!("documentation/{name}"), html(description)?.into_bytes()))
         };
         self.others.iter().map(write).collect()
