@@ -338,7 +338,9 @@ impl SystemInstance {
     pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
         // If earlier instances saved the state, it was freed with them.
         let Ok(saved) = self.own(saved) else { return Ok(()) };
-        self.each(|_, instance| instance.forget(saved))
+        // After an error, the others forget it too, because one number identifies the states of all components.
+        let forgotten = self.components.iter_mut().map(|instance| instance.forget(saved));
+        forgotten.fold(Ok(()), Result::and)
     }
 
     /// Serializes a saved state. A single FMU returns the bytes. For a system, the bytes of each component follow their length, which
@@ -390,9 +392,14 @@ impl SystemInstance {
         &mut self,
         mut state: impl FnMut(usize, &mut Instance) -> Result<fmi_abi::client::Saved, Rejection>,
     ) -> Result<Saved, Rejection> {
-        let mut done = None;
+        let mut done: Option<(usize, fmi_abi::client::Saved)> = None;
         let kept = self.each(|component, instance| {
-            done = Some((component, state(component, instance)?));
+            let saved = state(component, instance)?;
+            assert!(
+                done.is_none_or(|(_, first)| first == saved),
+                "the states of all components have one number"
+            );
+            done = Some((component, saved));
             Ok(())
         });
         let (last, saved) = match (kept, done) {

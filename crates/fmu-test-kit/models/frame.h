@@ -539,6 +539,7 @@ BOTH_AS(FreeFMUstate, FreeFMUState, (void *c, void **state), (c, state), {
     if (!state) return OK;
     free(*state);
     if (!IS(freed_handle_stays)) *state = NULL;
+    if (IS(free_state_fails)) return reject(f, "a state cannot be freed");
     return OK;
 })
 BOTH_AS(SerializedFMUstateSize, SerializedFMUStateSize, (void *c, void *state, size_t *size), (c, state, size), {

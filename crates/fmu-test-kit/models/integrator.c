@@ -36,6 +36,7 @@
      huge_state         reports a serialized state of 2^46 bytes
      endless_state      reports a serialized state of SIZE_MAX bytes
      growing_state      reports a larger size of the serialized state with each call
+     free_state_fails   returns an error when a saved state is freed
      keeps_y, keeps_bias  values that survive a reset
      derived            calculates the gain from the parameter only once, so that the first gain survives a reset
      misbehaving        has another output, and the parameter `behaviour` selects how a run ends (BEHAVIOURS)

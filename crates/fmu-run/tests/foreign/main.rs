@@ -224,6 +224,33 @@ fn a_state_does_not_outlive_its_instance() {
     }
 }
 
+/// If one component cannot free a state, the others free it all the same, so that a state is the same instant of all components.
+#[test]
+fn a_state_of_a_system_is_one_instant() {
+    for standard in VERSIONS {
+        let [one, other] = ["free_state_fails", "plain"].map(|manner| opened_with(manner, standard, &[]));
+        for components in [[("a", &one), ("b", &other)], [("b", &other), ("a", &one)]] {
+            let composition = Composition { components: components.to_vec(), ..Composition::default() };
+            let system = System::connect(&composition).unwrap();
+            let mut both = system.instances(&Setup::default()).unwrap();
+            both.set(&system.select(&["a.u", "b.u"]).unwrap(), &[1.0, 1.0], None).unwrap();
+            let first = both.save().unwrap();
+            both.forget(first);
+            let mut save_after_a_second = || {
+                both.step(1.0, None).unwrap();
+                both.save().unwrap()
+            };
+            let states = [1.0, 2.0, 3.0].map(|y| (y, save_after_a_second()));
+            for (y, state) in &states {
+                both.restore(state, None).unwrap();
+                let mut found = [0.0; 2];
+                both.get(&system.select(&["a.y", "b.y"]).unwrap(), &mut found);
+                assert_eq!((found, both.errors().count()), ([*y; 2], 0), "{standard}");
+            }
+        }
+    }
+}
+
 #[test]
 fn absurd_sizes_of_states_are_errors() {
     for standard in VERSIONS {
