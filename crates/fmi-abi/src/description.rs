@@ -1,11 +1,12 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
-//! standard or stay empty, and each [`Fault`] is listed.
+//! standard or stay empty, and each [`Fault`] is listed. An attribute whose value cannot be read is such a fault.
 
+use crate::attribute::{Typed, unreadable, value, values};
 use crate::{
-    BaseType, Causality, DependencyKind, Initial, Interface, Standard, Variability, boolean,
-    is_plain_file_name, shown,
+    BaseType, Causality, DependencyKind, Initial, Interface, Standard, Variability, is_plain_file_name, shown,
 };
 use roxmltree::Node;
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -14,8 +15,8 @@ pub const MAX_VALUES: usize = 1 << 22;
 /// Upper bounds for the memory that a variable and a value in a list take, in bytes.
 const VARIABLE: usize = 1000;
 const VALUE: usize = 64;
-/// Maximum number of faults that are listed for references to missing variables.
-const MAX_LOST: usize = 100;
+/// Maximum number of faults that are listed for each kind.
+const MAX_FAULTS: usize = 100;
 
 /// A variable; an array of FMI 3.0 is one variable.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +71,19 @@ pub struct Variable {
     /// Whether the variable is an input clock that the importer must activate at times that follow from its interval: a clock whose
     /// `intervalVariability` is not `triggered` (section 2.2.8.1 of FMI 3.0).
     pub is_periodic: bool,
+    /// Description; empty if missing.
+    pub description: String,
+    /// Further names of the variable (section 2.4.7 of FMI 3.0).
+    pub aliases: Vec<Alias>,
+}
+
+/// A further name of a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alias {
+    /// Name; empty if missing.
+    pub name: String,
+    /// Display unit, if given.
+    pub display_unit: Option<Arc<str>>,
     /// Description; empty if missing.
     pub description: String,
 }
@@ -166,23 +180,55 @@ pub struct Offer {
     pub saves_states: bool,
     /// Whether saved states can be serialized (`canSerializeFMUstate`).
     pub serializes_states: bool,
-    attributes: HashMap<String, String>,
+    /// Names of the attributes that are true.
+    flags: BTreeSet<&'static str>,
+    fixed_internal_step_size: Option<f64>,
 }
 
+/// The Boolean attributes of interface types in FMI 2.0 and 3.0.
+const FLAGS: [&str; 21] = [
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canGetAndSetFMUState",
+    "canGetAndSetFMUstate",
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canNotUseMemoryManagementFunctions",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "canRunAsynchronuously",
+    "canSerializeFMUState",
+    "canSerializeFMUstate",
+    "completedIntegratorStepNotNeeded",
+    "hasEventMode",
+    "mightReturnEarlyFromDoStep",
+    "needsCompletedIntegratorStep",
+    "needsExecutionTool",
+    "providesAdjointDerivatives",
+    "providesDirectionalDerivative",
+    "providesDirectionalDerivatives",
+    "providesEvaluateDiscreteStates",
+    "providesIntermediateUpdate",
+    "providesPerElementDependencies",
+];
+
 impl Offer {
-    fn read(node: Node, standard: Standard) -> Self {
-        let is_true = |name| matches!(node.attribute(name), Some("true" | "1"));
+    fn read(node: Node, standard: Standard, faults: &Faults) -> Self {
+        let is_true = |name: &&str| faults.read(node, name) == Some(true);
+        let flags: BTreeSet<&'static str> = FLAGS.into_iter().filter(is_true).collect();
+        let is_either = |names: &[&str]| names.iter().any(|name| flags.contains(name));
         Self {
             identifier: attribute_or_empty(node, "modelIdentifier"),
-            once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
-            needs_execution_tool: is_true("needsExecutionTool"),
-            variable_step_size: is_true("canHandleVariableCommunicationStepSize"),
-            input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
-            directional_derivatives: is_true("providesDirectionalDerivative")
-                || is_true("providesDirectionalDerivatives"),
-            saves_states: is_true("canGetAndSetFMUstate") || is_true("canGetAndSetFMUState"),
-            serializes_states: is_true("canSerializeFMUstate") || is_true("canSerializeFMUState"),
-            attributes: attributes(node).into_iter().collect(),
+            once_per_process: is_either(&["canBeInstantiatedOnlyOncePerProcess"]),
+            needs_execution_tool: is_either(&["needsExecutionTool"]),
+            variable_step_size: is_either(&["canHandleVariableCommunicationStepSize"]),
+            input_derivatives: standard == Standard::Fmi2 && is_either(&["canInterpolateInputs"]),
+            directional_derivatives: is_either(&[
+                "providesDirectionalDerivative",
+                "providesDirectionalDerivatives",
+            ]),
+            saves_states: is_either(&["canGetAndSetFMUstate", "canGetAndSetFMUState"]),
+            serializes_states: is_either(&["canSerializeFMUstate", "canSerializeFMUState"]),
+            flags,
+            fixed_internal_step_size: faults.read(node, "fixedInternalStepSize"),
         }
     }
 
@@ -200,27 +246,53 @@ impl Offer {
 
     /// Returns whether at least one of these attributes is true.
     pub fn can(&self, names: &[&str]) -> bool {
-        names.iter().any(|name| matches!(self.attributes.get(*name).map(String::as_str), Some("true" | "1")))
+        names.iter().any(|name| self.flags.contains(name))
     }
 
-    /// Returns the value of an attribute, if it is a positive and finite number.
-    pub fn number(&self, name: &str) -> Option<f64> {
-        let number: Option<f64> = self.attributes.get(name)?.trim().parse().ok();
-        number.filter(|number| *number > 0.0 && number.is_finite())
+    /// Returns the step size to which communication points should be aligned (`fixedInternalStepSize`, FMI 3.0), if it is a
+    /// positive and finite number.
+    pub fn fixed_internal_step_size(&self) -> Option<f64> {
+        self.fixed_internal_step_size.filter(|size| *size > 0.0 && size.is_finite())
     }
 }
 
 /// Kinds of faults in a model description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The name of the model, its guid or instantiation token, or a `modelIdentifier` is missing.
+    /// The name of the model, its guid or instantiation token, a `modelIdentifier`, or the value of a `Start` is missing.
     Attribute,
     /// A variable has no value reference.
     Reference,
-    /// A variable has no type.
+    /// A variable has no type, or an unknown one.
     Type,
-    /// `ModelStructure` refers to a variable that does not exist.
+    /// `ModelStructure` or the attribute `derivative` refers to a variable that does not exist, or does not fit together.
     Structure,
+    /// The value of an attribute is not of the attribute's type. The attribute counts as missing.
+    Value,
+}
+
+/// The faults that have been found so far, at most [`MAX_FAULTS`] of each kind.
+#[derive(Default)]
+struct Faults(RefCell<Vec<(Fault, String)>>);
+
+impl Faults {
+    /// Adds a fault. The message is only made if the fault is listed.
+    fn add(&self, fault: Fault, why: impl FnOnce() -> String) {
+        let mut all = self.0.borrow_mut();
+        if all.iter().filter(|(of, _)| *of == fault).count() < MAX_FAULTS {
+            all.push((fault, why()));
+        }
+    }
+
+    /// Reads an attribute. If its value cannot be read, this is a fault, and the attribute counts as missing.
+    fn read<T: Typed>(&self, node: Node, name: &str) -> Option<T> {
+        value(node, name)?.map_err(|text| self.add(Fault::Value, || unreadable::<T>(node, name, text))).ok()
+    }
+
+    /// Reads an attribute that is a list. If one of its values cannot be read, this is a fault, and the attribute counts as missing.
+    fn read_list<T: Typed>(&self, node: Node, name: &str) -> Option<Vec<T>> {
+        values(node, name)?.map_err(|text| self.add(Fault::Value, || unreadable::<T>(node, name, text))).ok()
+    }
 }
 
 /// Content of a model description.
@@ -263,7 +335,7 @@ pub struct ModelDescription {
     /// Names of the declared types.
     pub types: BTreeSet<String>,
     /// Enumerations by name, each with the names and numbers of its items.
-    pub enumerations: BTreeMap<String, Vec<(String, String)>>,
+    pub enumerations: BTreeMap<String, Vec<(String, i64)>>,
     /// Faults, each with a message.
     pub faults: Vec<(Fault, String)>,
 }
@@ -299,25 +371,27 @@ impl ModelDescription {
                 return Err(format!("its fmiVersion is \"{}\"; FMI 2.0 and 3.0 are supported", shown(other)));
             }
         };
-        let mut faults = Vec::new();
-        let mut needs = |node: Node, name: &str| {
+        let faults = Faults::default();
+        let needs = |node: Node, name: &str| {
             if node.attribute(name).is_none() {
-                faults.push((Fault::Attribute, format!("{} lacks {name}", node.tag_name().name())));
+                faults.add(Fault::Attribute, || format!("{} lacks {name}", node.tag_name().name()));
             }
         };
         needs(root, "modelName");
         needs(root, token);
-        let mut offer = |name: &str| {
+        let offer = |name: &str| {
             let node = child(root, name)?;
             needs(node, "modelIdentifier");
-            Some(Offer::read(node, standard))
+            Some(Offer::read(node, standard, &faults))
         };
         let (co_simulation, model_exchange) = (offer("CoSimulation"), offer("ModelExchange"));
         [&co_simulation, &model_exchange].into_iter().flatten().try_for_each(Offer::check)?;
         let experiment = child(root, "DefaultExperiment");
-        let time = |name: &str| -> Option<f64> { experiment?.attribute(name)?.trim().parse().ok() };
+        let time = |name: &str| -> Option<f64> { faults.read(experiment?, name) };
         let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
-        let variables = variables(root, standard, structure, &mut faults)?;
+        let (variables, positions) = variables(root, standard, structure, &faults)?;
+        let units = || elements(root, "UnitDefinitions");
+        let types = || elements(root, "TypeDefinitions");
         let mut description = Self {
             standard,
             version,
@@ -335,13 +409,14 @@ impl ModelDescription {
             initial_unknowns: Vec::new(),
             event_indicators: None,
             log_categories: named("LogCategories").collect(),
-            units: elements(root, "UnitDefinitions").map(unit).collect(),
-            display_units: elements(root, "UnitDefinitions").map(display_units).collect(),
+            units: units().map(|node| unit(node, &faults)).collect(),
+            display_units: units().map(|node| display_units(node, &faults)).collect(),
             types: named("TypeDefinitions").collect(),
-            enumerations: elements(root, "TypeDefinitions").filter_map(enumeration).collect(),
-            faults,
+            enumerations: types().filter_map(|node| enumeration(node, &faults)).collect(),
+            faults: Vec::new(),
         };
-        description.structure(root);
+        description.structure(root, &positions, &faults);
+        description.faults = faults.0.into_inner();
         Ok(description)
     }
 
@@ -353,44 +428,30 @@ impl ModelDescription {
         }
     }
 
-    /// Reads the model structure, which refers to variables by index in FMI 2.0, counted from 1, and by value
+    /// Reads the model structure, which refers to variables by position in FMI 2.0, counted from 1, and by value
     /// reference in FMI 3.0.
-    fn structure(&mut self, root: Node) {
+    fn structure(&mut self, root: Node, positions: &Positions, faults: &Faults) {
         let by_reference: HashMap<u32, usize> =
             self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
-        let (count, standard) = (self.variables.len(), self.standard);
-        let mut lost = Vec::new();
-        let mut find = |text: &str| {
-            let number: Option<u32> = text.parse().ok();
+        let standard = self.standard;
+        let find = |number: u32| {
             let found = match standard {
-                Standard::Fmi2 => number.and_then(from_one).filter(|index| *index < count),
-                Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
+                Standard::Fmi2 => positions.find(number),
+                Standard::Fmi3 => by_reference.get(&number).copied().map(Some),
             };
-            if found.is_none() && lost.len() < MAX_LOST {
-                lost.push(format!("ModelStructure refers to {}, which does not exist", shown(text)));
+            if found.is_none() {
+                let why = || format!("ModelStructure refers to {number}, which does not exist");
+                faults.add(Fault::Structure, why);
             }
-            found
+            found.flatten()
         };
         let attribute = if standard == Standard::Fmi2 { "index" } else { "valueReference" };
-        let mut unknown = |node: Node| {
-            let variable = find(node.attribute(attribute)?.trim())?;
-            let list = node.attribute("dependencies");
-            let dependencies: Option<Vec<usize>> =
-                list.map(|list| list.split_whitespace().filter_map(&mut find).collect());
-            let kinds = node.attribute("dependenciesKind").unwrap_or_default().split_whitespace();
-            // A kind with an unknown name is read as the one that states least.
-            let kind = |name| DependencyKind::of_name(name).unwrap_or(DependencyKind::Dependent);
-            let mut kinds: Vec<DependencyKind> = kinds.map(kind).collect();
-            if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
-                kinds.clear();
-            }
-            Some(Unknown { variable, dependencies, kinds })
-        };
-        let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
+        let list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
             let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
             // Only the first entry of a variable counts.
             let mut known = HashSet::new();
-            let mut new = |node| unknown(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
+            let new = |node| unknown(node, attribute, &find, faults);
+            let mut new = |node| new(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
             match standard {
                 Standard::Fmi2 => elements(structure, group).filter_map(&mut new).collect(),
                 Standard::Fmi3 => {
@@ -404,81 +465,139 @@ impl ModelDescription {
         self.initial_unknowns = list("InitialUnknowns", "InitialUnknown");
         let indicators = list("", "EventIndicator");
         self.event_indicators = match standard {
-            Standard::Fmi2 => root.attribute("numberOfEventIndicators").map_or(Some(0), |n| n.parse().ok()),
+            Standard::Fmi2 if root.has_attribute("numberOfEventIndicators") => {
+                faults.read(root, "numberOfEventIndicators")
+            }
+            Standard::Fmi2 => Some(0),
             Standard::Fmi3 => indicators.iter().try_fold(0_usize, |count, unknown| {
                 count.checked_add(self.variables[unknown.variable].size?)
             }),
         };
-        self.faults.extend(lost.into_iter().map(|why| (Fault::Structure, why)));
     }
 }
 
+/// Reads an unknown. `find` returns the index of a variable, or `None` if it does not exist or cannot be read. If one of the dependencies
+/// cannot be read, the unknown may depend on everything, as if the attribute were missing.
+fn unknown(
+    node: Node,
+    attribute: &str,
+    find: &impl Fn(u32) -> Option<usize>,
+    faults: &Faults,
+) -> Option<Unknown> {
+    let kind = node.tag_name().name();
+    if node.attribute(attribute).is_none() {
+        faults.add(Fault::Structure, || format!("ModelStructure has an {kind} without {attribute}"));
+    }
+    let variable = find(faults.read(node, attribute)?)?;
+    let dependencies: Option<Vec<u32>> = faults.read_list(node, "dependencies");
+    let dependencies =
+        dependencies.and_then(|list| list.into_iter().map(find).collect::<Option<Vec<usize>>>());
+    let mut kinds: Vec<DependencyKind> = faults.read_list(node, "dependenciesKind").unwrap_or_default();
+    if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
+        kinds.clear();
+    }
+    Some(Unknown { variable, dependencies, kinds })
+}
+
+/// The index of each variable of the file among the variables that could be read, in the order of the file.
+struct Positions(Vec<Option<usize>>);
+
+impl Positions {
+    /// Returns the index of the variable at a position, which counts from 1. The outer `None` means that the file has no such variable,
+    /// the inner one that it could not be read.
+    fn find(&self, number: u32) -> Option<Option<usize>> {
+        self.0.get((number as usize).checked_sub(1)?).copied()
+    }
+}
+
+/// Reads the variables. Variables without a value reference or a type are left out.
 fn variables(
     root: Node,
     standard: Standard,
     structure: &HashMap<u32, usize>,
-    faults: &mut Vec<(Fault, String)>,
-) -> Result<Vec<Variable>, String> {
+    faults: &Faults,
+) -> Result<(Vec<Variable>, Positions), String> {
     let types: HashMap<&str, Declared> = elements(root, "TypeDefinitions")
-        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node))))
+        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node, faults))))
         .collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
+    reserve(root, &nodes)?;
+    let quiet = |node: Node, name: &str| value(node, name).and_then(Result::ok);
+    // Start values of structural parameters, which are sizes.
+    let starts: HashMap<u32, Option<usize>> = nodes
+        .iter()
+        .rev()
+        .filter_map(|node| {
+            Some((u32::try_from(quiet(*node, "valueReference")?).ok()?, quiet(*node, "start")))
+        })
+        .collect();
+    let (mut found, mut positions) = (Vec::new(), Positions(Vec::with_capacity(nodes.len())));
+    let mut derivatives = Vec::new();
+    let mut remaining = MAX_VALUES;
+    for node in &nodes {
+        let named = || shown(node.attribute("name").unwrap_or_default());
+        let is_type = |child: &Node| base_of(standard, child.tag_name().name()).is_some();
+        let of_type = match standard {
+            Standard::Fmi2 => node.children().find(is_type),
+            Standard::Fmi3 => Some(*node).filter(|node| is_type(node) || node.has_tag_name("Clock")),
+        };
+        let reference: Option<u32> = faults.read(*node, "valueReference");
+        if node.attribute("valueReference").is_none() {
+            faults.add(Fault::Reference, || format!("{} has no value reference", named()));
+        } else if of_type.is_none() {
+            faults.add(Fault::Type, || match standard {
+                Standard::Fmi2 => format!("{} has no type", named()),
+                Standard::Fmi3 => {
+                    format!("{} has the type {}, which is unknown", named(), shown(node.tag_name().name()))
+                }
+            });
+        }
+        let (Some(reference), Some(of_type)) = (reference, of_type) else {
+            positions.0.push(None);
+            continue;
+        };
+        positions.0.push(Some(found.len()));
+        let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
+        // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
+        let size = |dimension: Node| {
+            faults.read(dimension, "start").or_else(|| {
+                let parameter = faults.read(dimension, "valueReference")?;
+                structure.get(&parameter).copied().or_else(|| *starts.get(&parameter)?)
+            })
+        };
+        let dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).map(size).collect();
+        let mut variable = variable(*node, of_type, declared, (standard, reference, dimensions), faults);
+        variable.limit(&mut remaining);
+        derivatives.push(faults.read::<u32>(of_type, "derivative"));
+        found.push(variable);
+    }
+    let by_reference: HashMap<u32, usize> =
+        found.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
+    for (variable, derivative) in found.iter_mut().zip(derivatives) {
+        let Some(of) = derivative else { continue };
+        let state = match standard {
+            Standard::Fmi2 => positions.find(of),
+            Standard::Fmi3 => by_reference.get(&of).copied().map(Some),
+        };
+        if state.is_none() {
+            let name = shown(&variable.name);
+            faults
+                .add(Fault::Structure, || format!("{name} is the derivative of {of}, which does not exist"));
+        }
+        variable.derivative_of = state.flatten();
+    }
+    Ok((found, positions))
+}
+
+/// Checks that there is enough memory for the variables and for the values in lists.
+fn reserve(root: Node, nodes: &[Node]) -> Result<(), String> {
     let lists = root
         .descendants()
         .flat_map(|node| ["start", "dependencies", "dependenciesKind"].map(|name| node.attribute(name)));
     let values: usize = lists.flatten().map(|list| list.split_ascii_whitespace().count()).sum();
-    crate::xml::reserve(VARIABLE * nodes.len() + VALUE * values)
-        .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
-    let mut remaining = MAX_VALUES;
-    let indexed = nodes.iter().enumerate().rev();
-    // The index of each variable, and its start value, which is a size if it is a structural parameter.
-    let by_reference: HashMap<u32, (usize, Option<usize>)> = indexed
-        .filter_map(|(index, node)| Some((number(*node, "valueReference")?, (index, number(*node, "start")))))
-        .collect();
-    let mut found = Vec::new();
-    for node in &nodes {
-        let Some(reference) = number(*node, "valueReference") else {
-            faults.push((
-                Fault::Reference,
-                format!("{} has no value reference", shown(node.attribute("name").unwrap_or_default())),
-            ));
-            continue;
-        };
-        let is_type = |child: &Node| base_of(standard, child.tag_name().name()).is_some();
-        let of_type = match standard {
-            Standard::Fmi2 => node.children().find(is_type),
-            Standard::Fmi3 => Some(*node),
-        };
-        let Some(of_type) = of_type else {
-            faults.push((
-                Fault::Type,
-                format!("{} has no type", shown(node.attribute("name").unwrap_or_default())),
-            ));
-            continue;
-        };
-        let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
-        let base = base_of(standard, of_type.tag_name().name());
-        // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
-        let size = |dimension: Node| {
-            number(dimension, "start").or_else(|| {
-                let parameter = number(dimension, "valueReference")?;
-                structure.get(&parameter).copied().or_else(|| by_reference.get(&parameter)?.1)
-            })
-        };
-        let dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).map(size);
-        let derivative_of = number(of_type, "derivative").and_then(|of| match standard {
-            Standard::Fmi2 => from_one(of).filter(|index| *index < nodes.len()),
-            Standard::Fmi3 => by_reference.get(&of).map(|(index, _)| *index),
-        });
-        let mut variable = variable(*node, of_type, declared, (standard, base), dimensions.collect());
-        (variable.reference, variable.derivative_of) = (reference, derivative_of);
-        variable.limit(&mut remaining);
-        found.push(variable);
-    }
-    let count = found.len();
-    let exists = |index: &usize| *index < count;
-    found.iter_mut().for_each(|of| of.derivative_of = of.derivative_of.filter(exists));
-    Ok(found)
+    let aliases = nodes.iter().flat_map(Node::children).filter(|child| child.has_tag_name("Alias")).count();
+    crate::xml::reserve(VARIABLE * (nodes.len() + aliases) + VALUE * values)
+        .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))
 }
 
 /// Attributes of a declared type, which are read once for all variables of this type.
@@ -493,17 +612,21 @@ struct Declared {
 
 impl Declared {
     /// In FMI 2.0, a child element has the attributes (section 2.2.3).
-    fn read(node: Node) -> Self {
+    fn read(node: Node, faults: &Faults) -> Self {
         let inner = node.first_element_child();
-        let attribute = |name| node.attribute(name).or_else(|| inner?.attribute(name));
-        let number = |name| attribute(name)?.trim().parse().ok();
+        let owner = |name: &str| match inner {
+            Some(inner) if !node.has_attribute(name) => inner,
+            _ => node,
+        };
+        let text = |name: &str| owner(name).attribute(name).map(Arc::from);
+        let number = |name: &str| faults.read(owner(name), name);
         Self {
-            unit: attribute("unit").map(Arc::from),
-            display_unit: attribute("displayUnit").map(Arc::from),
+            unit: text("unit"),
+            display_unit: text("displayUnit"),
             min: number("min"),
             max: number("max"),
             nominal: number("nominal"),
-            is_relative: attribute("relativeQuantity").and_then(boolean),
+            is_relative: faults.read(owner("relativeQuantity"), "relativeQuantity"),
         }
     }
 }
@@ -513,41 +636,37 @@ fn variable(
     node: Node,
     of_type: Node,
     declared: Option<&Declared>,
-    (standard, base): (Standard, Option<BaseType>),
-    dimensions: Option<Vec<usize>>,
+    (standard, reference, dimensions): (Standard, u32, Option<Vec<usize>>),
+    faults: &Faults,
 ) -> Variable {
     let shared = |name: &str, of_declared: fn(&Declared) -> Option<Arc<str>>| {
         of_type.attribute(name).map(Arc::from).or_else(|| of_declared(declared?))
     };
-    let limit = |name: &str, of_declared: fn(&Declared) -> Option<f64>| match of_type.attribute(name) {
-        Some(value) => value.trim().parse().ok(),
-        None => declared.and_then(of_declared),
+    let limit = |name: &str, of_declared: fn(&Declared) -> Option<f64>| match of_type.has_attribute(name) {
+        true => faults.read(of_type, name),
+        false => declared.and_then(of_declared),
     };
-    let is_relative = match of_type.attribute("relativeQuantity") {
-        Some(value) => boolean(value),
-        None => declared.and_then(|of| of.is_relative),
+    let is_relative = match of_type.has_attribute("relativeQuantity") {
+        true => faults.read(of_type, "relativeQuantity"),
+        false => declared.and_then(|of| of.is_relative),
     };
-    let causality = node.attribute("causality").and_then(Causality::of_name).unwrap_or(Causality::Local);
-    let variability = node.attribute("variability");
-    let has_variability = variability.is_some();
-    let variability = variability
-        .and_then(Variability::of_name)
-        .unwrap_or_else(|| default_variability(standard, causality, base));
-    let initial = node
-        .attribute("initial")
-        .and_then(Initial::of_name)
-        .or_else(|| default_initial(causality, variability));
+    let base = base_of(standard, of_type.tag_name().name());
+    let causality = faults.read(node, "causality").unwrap_or(Causality::Local);
+    let variability = faults.read(node, "variability");
+    let has_variability = node.has_attribute("variability");
+    let variability = variability.unwrap_or_else(|| default_variability(standard, causality, base));
+    let initial = faults.read(node, "initial").or_else(|| default_initial(causality, variability));
     let product = |sizes: &Vec<usize>| sizes.iter().try_fold(1_usize, |all, size| all.checked_mul(*size));
     let size = dimensions.as_ref().and_then(product);
     Variable {
         name: attribute_or_empty(node, "name"),
-        reference: 0,
+        reference,
         base,
         causality,
         variability,
         has_variability,
         initial,
-        start: start_values(node, of_type, base),
+        start: start_values(node, of_type, base, faults),
         dimensions,
         size,
         is_too_large: false,
@@ -559,18 +678,27 @@ fn variable(
         is_relative: is_relative == Some(true),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
-        reinit: matches!(of_type.attribute("reinit"), Some("true" | "1")),
+        reinit: faults.read(of_type, "reinit") == Some(true),
         clocked: node.attribute("clocks").is_some(),
-        once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
+        once_per_instant: faults.read(node, "canHandleMultipleSetPerTimeInstant") == Some(false),
         is_periodic: node.has_tag_name("Clock")
             && causality == Causality::Input
             && node.attribute("intervalVariability").map(str::trim) != Some("triggered"),
+        description: attribute_or_empty(node, "description"),
+        aliases: node.children().filter(|child| child.has_tag_name("Alias")).map(alias).collect(),
+    }
+}
+
+fn alias(node: Node) -> Alias {
+    Alias {
+        name: attribute_or_empty(node, "name"),
+        display_unit: node.attribute("displayUnit").map(Arc::from),
         description: attribute_or_empty(node, "description"),
     }
 }
 
 /// Reads the start values as written. In FMI 3.0, strings and binary values are in child elements (section 2.4.7.5).
-fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String> {
+fn start_values(node: Node, of_type: Node, base: Option<BaseType>, faults: &Faults) -> Vec<String> {
     let list = of_type.attribute("start");
     let start: Vec<String> = match base {
         Some(BaseType::String | BaseType::Binary) | None => list.map(str::to_owned).into_iter().collect(),
@@ -580,7 +708,14 @@ fn start_values(node: Node, of_type: Node, base: Option<BaseType>) -> Vec<String
         return start;
     }
     let starts = node.children().filter(|child| child.has_tag_name("Start"));
-    starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect()
+    let value = |child: Node| {
+        if !child.has_attribute("value") {
+            let name = || shown(node.attribute("name").unwrap_or_default());
+            faults.add(Fault::Attribute, || format!("a Start of {} lacks its value", name()));
+        }
+        attribute_or_empty(child, "value")
+    };
+    starts.map(value).collect()
 }
 
 /// Returns the default of `initial`, if there is one (table in section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
@@ -612,44 +747,46 @@ fn base_of(standard: Standard, element: &str) -> Option<BaseType> {
 }
 
 /// Reads a unit (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
-fn unit(node: Node) -> (String, Vec<(String, String)>) {
-    (attribute_or_empty(node, "name"), child(node, "BaseUnit").map(attributes).unwrap_or_default())
+fn unit(node: Node, faults: &Faults) -> (String, Vec<(String, String)>) {
+    let base = child(node, "BaseUnit");
+    if let Some(base) = base {
+        for name in ["factor", "offset"] {
+            faults.read::<f64>(base, name);
+        }
+        for name in ["kg", "m", "s", "A", "K", "mol", "cd", "rad"] {
+            faults.read::<i32>(base, name);
+        }
+    }
+    (attribute_or_empty(node, "name"), base.map(attributes).unwrap_or_default())
 }
 
-/// Reads display units: value in the display unit = factor * value in the unit + offset. Skips inverse units
-/// of FMI 3.0.
-fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
-    let others = node.children().filter(|of| {
-        of.has_tag_name("DisplayUnit") && of.attribute("inverse").and_then(boolean) != Some(true)
-    });
-    let others = others.filter_map(|of| {
-        let number =
-            |name, default| of.attribute(name).and_then(|value| value.parse().ok()).unwrap_or(default);
-        Some((of.attribute("name")?.to_owned(), number("factor", 1.0), number("offset", 0.0)))
-    });
+/// Reads display units: value in the display unit = factor * value in the unit + offset. Skips inverse units of FMI 3.0, and those
+/// of which something cannot be read.
+fn display_units(node: Node, faults: &Faults) -> (String, Vec<(String, f64, f64)>) {
+    let one = |of: Node| {
+        let number = |name, default| match of.has_attribute(name) {
+            true => faults.read(of, name),
+            false => Some(default),
+        };
+        let is_inverse = of.has_attribute("inverse") && faults.read(of, "inverse") != Some(false);
+        let (factor, offset) = (number("factor", 1.0)?, number("offset", 0.0)?);
+        Some((of.attribute("name")?.to_owned(), factor, offset)).filter(|_| !is_inverse)
+    };
+    let others = node.children().filter(|of| of.has_tag_name("DisplayUnit")).filter_map(one);
     (attribute_or_empty(node, "name"), others.collect())
 }
 
 /// Reads an enumeration. In FMI 2.0 the type element contains an element for the base type (section 2.2.3);
 /// in FMI 3.0 they are one element (2.4.4).
-fn enumeration(node: Node) -> Option<(String, Vec<(String, String)>)> {
+fn enumeration(node: Node, faults: &Faults) -> Option<(String, Vec<(String, i64)>)> {
     let items = node.descendants().filter(|item| item.has_tag_name("Item"));
-    let item = |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
+    let item = |item: Node| Some((item.attribute("name")?.to_owned(), faults.read(item, "value")?));
     let items: Vec<_> = items.filter_map(item).collect();
     (!items.is_empty()).then(|| Some((node.attribute("name")?.to_owned(), items)))?
 }
 
-/// Converts an index that counts from 1 to one that counts from 0; `None` for 0.
-fn from_one(number: u32) -> Option<usize> {
-    (number as usize).checked_sub(1)
-}
-
 fn attribute_or_empty(node: Node, name: &str) -> String {
     node.attribute(name).unwrap_or_default().to_owned()
-}
-
-fn number<T: std::str::FromStr>(node: Node, name: &str) -> Option<T> {
-    node.attribute(name)?.trim().parse().ok()
 }
 
 fn attributes(node: Node) -> Vec<(String, String)> {

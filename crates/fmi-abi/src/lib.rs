@@ -2,6 +2,8 @@
 // Under Miri, the log callback is variadic as in C.
 #![cfg_attr(all(miri, feature = "calls"), feature(c_variadic))]
 
+#[cfg(feature = "description")]
+mod attribute;
 mod base_type;
 pub mod c_types;
 #[cfg(feature = "calls")]

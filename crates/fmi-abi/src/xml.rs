@@ -1,7 +1,12 @@
 //! Parses the XML of untrusted files. First checks that the parser will not need too much memory or time.
 
-use roxmltree::Document;
+pub use crate::attribute::{Typed, attribute};
+use roxmltree::{Document, Error};
 
+/// Beginnings and ends of markup that is not the start of an element.
+const SKIPPED: [(&str, &str); 4] = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("</", ">")];
+/// Maximum number of prefixes that are not declared.
+const MAX_UNDECLARED: usize = 10;
 /// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 250;
 /// Maximum number of comparisons that the parser may make for an empty file, and the number by which each byte of a
@@ -21,16 +26,65 @@ const ATTRIBUTE: usize = 200;
 /// Fails if the file is not well-formed, has a document type definition or elements that are nested too deep, or would
 /// take too much memory or time.
 pub fn parse<'a>(text: &'a str, name: &str) -> Result<Document<'a>, String> {
-    let count = |byte: u8| text.bytes().filter(|other| *other == byte).count();
-    let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();
-    reserve(bytes).map_err(|why| format!("{name} cannot be read: {why}"))?;
-    scan(text).map_err(|why| format!("{name} {why}"))?;
-    Document::parse(text).map_err(|error| match error {
-        roxmltree::Error::DtdDetected => {
+    check(text, name)?;
+    Document::parse(text).map_err(|error| refused(error, name))
+}
+
+/// Parses the content of an XML file as [`parse`] does, even if it uses prefixes without declaring them, as some tools do in
+/// annotations. Then `declared` gets the text with their declarations.
+///
+/// # Errors
+/// Fails for the other reasons of [`parse`].
+pub fn parse_undeclared<'a>(
+    text: &'a str,
+    name: &str,
+    declared: &'a mut String,
+) -> Result<Document<'a>, String> {
+    check(text, name)?;
+    let mut error = match Document::parse(text) {
+        Ok(document) => return Ok(document),
+        Err(error) => error,
+    };
+    text.clone_into(declared);
+    for _ in 0..MAX_UNDECLARED {
+        let (Error::UnknownNamespace(prefix, _), Some(at)) = (&error, root_name_end(declared)) else { break };
+        declared.insert_str(at, &format!(" xmlns:{prefix}=\"undeclared\""));
+        match Document::parse(declared) {
+            Ok(_) => return parse(declared, name),
+            Err(next) => error = next,
+        }
+    }
+    Err(refused(error, name))
+}
+
+/// Returns the end of the name of the root element.
+fn root_name_end(text: &str) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        let begin = at + text[at..].find('<')?;
+        let rest = &text[begin..];
+        let Some((start, end)) = SKIPPED.into_iter().find(|(start, _)| rest.starts_with(start)) else {
+            return Some(begin + rest.find(|letter: char| letter.is_whitespace() || "/>".contains(letter))?);
+        };
+        at = begin + start.len() + rest[start.len()..].find(end)? + end.len();
+    }
+}
+
+fn refused(error: Error, name: &str) -> String {
+    match error {
+        Error::DtdDetected => {
             format!("{name} has a document type definition (<!DOCTYPE>), which is not read here; remove it")
         }
         error => format!("{name} is not well-formed XML: {}", crate::shown(&error.to_string())),
-    })
+    }
+}
+
+/// Checks that the parser will not need too much memory or time.
+fn check(text: &str, name: &str) -> Result<(), String> {
+    let count = |byte: u8| text.bytes().filter(|other| *other == byte).count();
+    let bytes = ELEMENT * count(b'<') + ATTRIBUTE * count(b'=') + 2 * text.len();
+    reserve(bytes).map_err(|why| format!("{name} cannot be read: {why}"))?;
+    scan(text).map_err(|why| format!("{name} {why}"))
 }
 
 /// Checks that this number of bytes can be allocated. A collection that grows ends the process if memory runs out, so
@@ -59,9 +113,7 @@ fn scan(text: &str) -> Result<(), String> {
     let (mut at, mut comparisons) = (0, 0_usize);
     while let Some(begin) = text[at..].find('<').map(|offset| at + offset) {
         let rest = &text[begin..];
-        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("</", ">")]
-            .into_iter()
-            .find(|(start, _)| rest.starts_with(start));
+        let skipped = SKIPPED.into_iter().find(|(start, _)| rest.starts_with(start));
         if let Some((start, end)) = skipped {
             if start == "</" {
                 open.pop();
@@ -127,7 +179,7 @@ fn tag(bytes: &[u8]) -> Tag {
 
 #[cfg(test)]
 mod tests {
-    use super::parse;
+    use super::{parse, parse_undeclared};
 
     #[test]
     fn ordinary_files_are_read() {
@@ -137,6 +189,21 @@ mod tests {
         assert_eq!(parse(&text, "F").unwrap().descendants().filter(|node| node.is_element()).count(), 3);
         let deep = "<a>".repeat(250) + &"</a>".repeat(250);
         assert!(parse(&deep, "F").is_ok());
+    }
+
+    #[test]
+    fn prefixes_need_not_be_declared() {
+        let text = "<?xml version='1.0'?><!-- <a> --><a b='c'><d:e f:g='h'/><i/></a>";
+        assert!(parse(text, "F").is_err());
+        let mut declared = String::new();
+        let document = parse_undeclared(text, "F", &mut declared).unwrap();
+        let names: Vec<_> = document.root_element().children().map(|node| node.tag_name().name()).collect();
+        assert_eq!(names, ["e", "i"]);
+        let many: String = (0..11).map(|number| format!("<p{number}:a/>")).collect();
+        for wrong in ["<a", "<a:b>", &format!("<a>{many}</a>")] {
+            let error = parse_undeclared(wrong, "F", &mut String::new()).unwrap_err();
+            assert!(error.starts_with("F is not well-formed XML"), "{error}");
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ impl Description {
                 Fault::Reference => "description.references",
                 Fault::Type => "description.types",
                 Fault::Structure => "description.structure",
-                Fault::Attribute => return None,
+                Fault::Attribute | Fault::Value => return None,
             };
             Some((rule, why.clone()))
         };
@@ -161,6 +161,12 @@ impl Description {
             wrong.push(("description.experiment", why));
         }
         wrong
+    }
+
+    /// Returns the first attribute whose value is not of its type. The comparison with the schema finds it too, where there is one.
+    pub fn unreadable(&self) -> Option<Observation> {
+        let (_, why) = self.faults.iter().find(|(fault, _)| *fault == Fault::Value)?;
+        Some(("description.schema", why.clone()))
     }
 
     /// Returns whether most checks use Co-Simulation with Event Mode (section 2.3.1 of FMI 3.0, `eventModeUsed`): only if the FMU

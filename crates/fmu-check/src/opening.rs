@@ -43,7 +43,8 @@ pub fn opened(path: &Path, options: &Options, begin: Instant) -> anyhow::Result<
     if options.wants("description") {
         observations.extend(encoding);
         observations.extend(description.wrong.iter().cloned());
-        observations.extend(schema::violation(description.standard, &description.version, text));
+        let violation = schema::violation(description.standard, &description.version, text);
+        observations.extend(violation.or_else(|| description.unreadable()));
     }
     let (setting, without) = setting(options, directory, &description);
     let checker = Checker::new(description, setting, workers, options, begin);

@@ -49,7 +49,7 @@ pub fn range(description: &Description) -> f64 {
 /// `fixedInternalStepSize` if there is one (section 4.4.1 of FMI 3.0).
 pub fn step_size(description: &Description) -> f64 {
     let size = description.step_size.unwrap_or(range(description) / 100.0);
-    let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
+    let internal = description.co_simulation.as_ref().and_then(|offer| offer.fixed_internal_step_size());
     internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
 }
 

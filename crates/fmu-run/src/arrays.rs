@@ -122,15 +122,16 @@ impl Arrays {
         &self.all
     }
 
-    /// Adds an array with this name. Returns the numbers of its elements, or `None` if there are too many or they need too much
-    /// memory.
-    pub fn push(&mut self, array: Array, name: &str) -> Option<Range<u32>> {
+    /// Adds an array with its name and its aliases. Returns the numbers of its elements, or `None` if there are too many or they need
+    /// too much memory.
+    pub fn push<'a>(&mut self, array: Array, names: impl Iterator<Item = &'a str>) -> Option<Range<u32>> {
         let length = array.length;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
         // The name of an element has an index for each dimension.
         let indices: usize = array.sizes.iter().map(|size| size.to_string().len() + 1).sum();
-        let bytes = self.bytes.checked_add(length.checked_mul(ELEMENT + 2 * (name.len() + indices))?)?;
+        let each: usize = names.map(|name| ELEMENT + 2 * (name.len() + indices)).sum();
+        let bytes = self.bytes.checked_add(length.checked_mul(each)?)?;
         if self.elements.len() + length > MAX_ELEMENTS || bytes > MAX_BYTES {
             return None;
         }
@@ -201,7 +202,8 @@ mod tests {
             <Float64 name="huge" valueReference="8" start="0"><Dimension start="4000000000"/></Float64>
             <Float64 name="more" valueReference="6" start="0"><Dimension start="4294967296"/><Dimension start="4294967296"/></Float64>
             <Float64 name="unsized" valueReference="5"><Dimension valueReference="70"/></Float64>
-            <Float64 name="y" valueReference="1" causality="output"/>
+            <Float64 name="y" valueReference="1" causality="output" unit="m"><Alias name="z" description="again" displayUnit="mm"/></Float64>
+            <Float64 name="w" valueReference="11" start="1 2"><Dimension start="2"/><Alias name="v"/></Float64>
         </ModelVariables>
         <ModelStructure>
             <Output valueReference="2" dependencies="3 1"/>
@@ -213,7 +215,7 @@ mod tests {
     fn elements_are_variables() {
         let description = Description::parse(TEXT).unwrap();
         let names: Vec<_> = description.variables.iter().map(|of| of.name.as_str()).collect();
-        let expected = "n x[1] x[2] x[3] der(x[1]) der(x[2]) der(x[3]) m[1,1] m[1,2] m[1,3] m[2,1] m[2,2] m[2,3] s[1] s[2] y";
+        let expected = "n x[1] x[2] x[3] der(x[1]) der(x[2]) der(x[3]) m[1,1] m[1,2] m[1,3] m[2,1] m[2,2] m[2,3] s[1] s[2] y w[1] w[2] z v[1] v[2]";
         assert_eq!(names.join(" "), expected);
         assert_eq!(description.states, 3);
         let of = |name| description.variable(name).unwrap();
@@ -225,7 +227,21 @@ mod tests {
         let mut references: Vec<_> = description.variables.iter().map(|of| of.reference).collect();
         references.sort_unstable();
         references.dedup();
-        assert_eq!(references.len(), names.len(), "value references must be unique");
+        assert_eq!(
+            references.len(),
+            names.len() - 3,
+            "only aliases have the value reference of another variable"
+        );
+        assert_eq!(
+            ["z", "v[1]", "v[2]"].map(|name| of(name).reference),
+            ["y", "w[1]", "w[2]"].map(|name| of(name).reference)
+        );
+        let z = of("z");
+        assert_eq!(
+            (z.unit.as_deref(), z.display_unit.as_deref(), &*z.description),
+            (Some("m"), Some("mm"), "again")
+        );
+        assert_eq!((start("v[2]"), z.causality), (Some("2"), of("y").causality));
         let why = |name| description.why_missing(name).unwrap();
         assert!(why("huge").starts_with("is an array with too many elements"));
         assert!(why("more").starts_with("is an array with too many elements"));

@@ -14,11 +14,20 @@ pub(crate) struct Connector {
     pub ends: Vec<End>,
 }
 
+/// A variable of a component. Its name in the system, `component.variable`, could be another variable's too, because both parts may
+/// contain dots.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Place {
+    /// Index of the component.
+    pub component: usize,
+    /// Name of the variable in its FMU.
+    pub variable: String,
+}
+
 /// A connection between an input or output of a system and a variable of a component.
 #[derive(Clone, Debug)]
 pub(crate) struct End {
-    /// Name of the variable.
-    pub variable: String,
+    pub place: Place,
     /// Change from the value of the connector to the value of the variable.
     pub into: Change,
     /// The opposite change.

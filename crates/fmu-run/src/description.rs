@@ -6,7 +6,7 @@ use crate::index::Index;
 use crate::unit::Unit;
 use fmi_abi::client::VariableNames;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
-use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
+use fmi_abi::{BaseType, Causality, Value, Variability};
 use std::collections::HashMap;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
@@ -67,7 +67,7 @@ impl Deref for Variable {
 
 /// A set of variables, stored as ranges of keys because the elements of an array have consecutive value references.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Dependencies(Vec<Range<u64>>);
+pub struct Dependencies(Arc<[Range<u64>]>);
 
 impl Dependencies {
     fn of(mut ranges: Vec<Range<u64>>) -> Self {
@@ -79,7 +79,7 @@ impl Dependencies {
             }
             overlap
         });
-        Self(ranges)
+        Self(ranges.into())
     }
 
     /// Returns whether the set contains this variable.
@@ -90,7 +90,7 @@ impl Dependencies {
     }
 
     /// Returns the ranges of the [keys](Variable::key), in increasing order.
-    pub(crate) fn ranges(&self) -> &[Range<u64>] {
+    pub(crate) fn ranges(&self) -> &Arc<[Range<u64>]> {
         &self.0
     }
 }
@@ -99,7 +99,8 @@ impl Dependencies {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
     written: ModelDescription,
-    /// Variables, in the order of the model description.
+    /// Variables, in the order of the model description, and after them their aliases (section 2.4.7 of FMI 3.0), each of which is a
+    /// variable with the same value reference.
     pub variables: Vec<Variable>,
     /// Number of continuous states.
     pub states: usize,
@@ -161,9 +162,6 @@ impl Description {
         if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
             return Err(format!("modelDescription.xml: {why}"));
         }
-        if written.standard == Standard::Fmi2 && written.event_indicators.is_none() {
-            return Err("modelDescription.xml: numberOfEventIndicators is not a number".to_owned());
-        }
         let mut sizes = written.derivatives.iter().map(|of| written.variables[of.variable].size);
         let states = sizes.try_fold(0_usize, |all, size| all.checked_add(size?));
         // Only Model Exchange needs these numbers.
@@ -181,7 +179,13 @@ impl Description {
         let largest = written.variables.iter().map(|of| of.reference).max();
         let mut arrays = Arrays::after(largest.unwrap_or_default());
         let elements: Vec<_> = written.variables.iter().map(|of| elements_of(of, &mut arrays)).collect();
-        let count = elements.iter().flatten().map(|elements| elements.len()).sum();
+        let count = elements
+            .iter()
+            .zip(&written.variables)
+            .map(|(elements, of)| {
+                elements.as_ref().map_or(0, |elements| (1 + of.aliases.len()) * elements.len())
+            })
+            .sum();
         fmi_abi::xml::reserve(arrays.bytes())
             .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
         let mut variables = Vec::with_capacity(count);
@@ -192,6 +196,7 @@ impl Description {
             spans.push(begin..variables.len());
         }
         relate(&written, &spans, &mut variables);
+        add_aliases(&written, &spans, &arrays, &mut variables);
         Ok(Self {
             states,
             event_indicators,
@@ -219,7 +224,8 @@ impl Description {
         if self.indices.is_shared(name, |index| &self.variables[index].name) {
             return Some("is the name of several variables in modelDescription.xml");
         }
-        let of = self.written.variables.iter().find(|of| of.name == name)?;
+        let is_named = |of: &&Declared| of.name == name || of.aliases.iter().any(|alias| alias.name == name);
+        let of = self.written.variables.iter().find(is_named)?;
         match (of.base, &of.dimensions) {
             (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
             _ if of.clocked => Some(
@@ -249,15 +255,14 @@ impl Description {
     /// Returns whether directional derivatives with respect to this variable may exist, which is possible for inputs, parameters and
     /// continuous states.
     pub(crate) fn is_known(&self, name: &str) -> bool {
-        self.variable(name).is_some_and(Variable::is_settable)
-            || self
-                .variables
-                .iter()
-                .any(|of| of.derivative_of.is_some_and(|of| self.variables[of].name == name))
+        self.variable(name).is_some_and(|own| {
+            let is_own = |state: usize| self.variables[state].key() == own.key();
+            own.is_settable() || self.variables.iter().any(|of| of.derivative_of.is_some_and(is_own))
+        })
     }
 
     /// Returns the names and numbers of the items of a variable's enumeration, if it has one.
-    pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
+    pub fn items(&self, of: &Variable) -> Option<&[(String, i64)]> {
         self.enumerations.get(of.declared_type.as_deref()?).map(Vec::as_slice)
     }
 
@@ -268,10 +273,7 @@ impl Description {
     /// # Errors
     /// Returns a message that names the difference.
     pub fn connects(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
-        let [one, other] = [output, input].map(Variable::kind);
-        if one != other {
-            return Err(format!("the output is {one}, the input {other}"));
-        }
+        check_kinds(output, input)?;
         if let (Some(one), Some(other)) = (&output.unit, &input.unit) {
             match (self.unit_of(output), to.unit_of(input)) {
                 (Some(of_one), Some(of_other)) if of_one == of_other => {}
@@ -295,17 +297,11 @@ impl Description {
         to: &Self,
         input: &Variable,
     ) -> Result<(), String> {
-        let kinds = [output, input].map(Variable::kind);
-        if change.is_linear() && kinds != ["Real"; 2] {
+        if change.is_linear() && [output, input].map(Variable::kind) != ["Real"; 2] {
             return Err("linear transformations are only for Real".to_owned());
         }
-        let are_integers = kinds.iter().all(|kind| matches!(*kind, "Integer" | "Enumeration"));
-        match change.maps() > 0 {
-            true if are_integers => Ok(()),
-            _ if kinds[0] != kinds[1] => Err(format!("the output is {}, the input {}", kinds[0], kinds[1])),
-            true => Ok(()),
-            false => self.check_items(output, to, input),
-        }
+        check_kinds(output, input)?;
+        if change.maps() > 0 { Ok(()) } else { self.check_items(output, to, input) }
     }
 
     /// Fails if the variables have enumerations with different items.
@@ -322,6 +318,17 @@ impl Description {
     pub(crate) fn unit_of(&self, variable: &Variable) -> Option<Unit> {
         let unit = self.definitions.get(variable.unit.as_deref()?)?;
         Some(if variable.is_relative { unit.of_difference() } else { *unit })
+    }
+}
+
+/// Fails if the values of an output are of another kind than those of an input. Integers and enumerations are of one kind: FMI 2.0 has the
+/// same functions for both.
+fn check_kinds(output: &Variable, input: &Variable) -> Result<(), String> {
+    let kinds = [output, input].map(Variable::kind);
+    let are_integers = kinds.iter().all(|kind| matches!(*kind, "Integer" | "Enumeration"));
+    match kinds[0] == kinds[1] || are_integers {
+        true => Ok(()),
+        false => Err(format!("the output is {}, the input {}", kinds[0], kinds[1])),
     }
 }
 
@@ -346,6 +353,11 @@ impl Variable {
         self.causality == Causality::StructuralParameter
     }
 
+    /// Returns a copy of the variable with another start value.
+    pub(crate) fn starting_at(&self, start: Option<Arc<str>>) -> Self {
+        Self { start, ..self.clone() }
+    }
+
     /// Returns a copy of the variable for a connector that has another unit.
     pub(crate) fn in_unit(&self, unit: Arc<str>) -> Self {
         let (unit, display_unit, min, max) = (Some(unit), None, None, None);
@@ -353,17 +365,9 @@ impl Variable {
         Self { attributes: Arc::new(attributes), ..self.clone() }
     }
 
-    /// Returns a number that identifies the value of the variable in its FMU. It contains the type, because in FMI 2.0 variables of
-    /// different types may have the same value reference, and only integers and enumerations share them (section 2.2.7 of FMI 2.0).
+    /// Returns a number that identifies the value of the variable in its FMU.
     pub(crate) fn key(&self) -> u64 {
-        let kind = match self.kind() {
-            "Real" => 0,
-            "Integer" | "Enumeration" => 1,
-            "Boolean" => 2,
-            "String" => 3,
-            _ => 4,
-        };
-        kind << u32::BITS | u64::from(self.reference)
+        key_of(self.base, self.reference)
     }
 
     /// Returns the type of the variable, as it follows “is” in messages: `a string`, `binary`.
@@ -381,15 +385,32 @@ impl Variable {
     /// Returns the name of the type. As in FMI 2.0, there is one name for all floating-point types (`Real`) and one for all integer
     /// types (`Integer`).
     pub fn kind(&self) -> &'static str {
-        match self.base {
-            BaseType::Real | BaseType::Float32 => "Real",
-            BaseType::Boolean => "Boolean",
-            BaseType::String => "String",
-            BaseType::Binary => "Binary",
-            BaseType::Enumeration => "Enumeration",
-            _ => "Integer",
-        }
+        kind_of(self.base)
     }
+}
+
+fn kind_of(base: BaseType) -> &'static str {
+    match base {
+        BaseType::Real | BaseType::Float32 => "Real",
+        BaseType::Boolean => "Boolean",
+        BaseType::String => "String",
+        BaseType::Binary => "Binary",
+        BaseType::Enumeration => "Enumeration",
+        _ => "Integer",
+    }
+}
+
+/// Returns a number that identifies the value of a variable in its FMU. It contains the type, because in FMI 2.0 variables of different
+/// types may have the same value reference, and only integers and enumerations share them (section 2.2.7 of FMI 2.0).
+pub(crate) fn key_of(base: BaseType, reference: u32) -> u64 {
+    let kind = match kind_of(base) {
+        "Real" => 0,
+        "Integer" | "Enumeration" => 1,
+        "Boolean" => 2,
+        "String" => 3,
+        _ => 4,
+    };
+    kind << u32::BITS | u64::from(reference)
 }
 
 /// Adds the elements of an array to `arrays` and returns their value references. Returns a meaningless range of length 1 for a
@@ -400,9 +421,10 @@ fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
         return None;
     }
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
+    let names = || std::iter::once(&*of.name).chain(of.aliases.iter().map(|alias| &*alias.name));
     match sizes.is_empty() {
         true => Some(0..1),
-        false => arrays.push(Array::new(of, base)?, &of.name),
+        false => arrays.push(Array::new(of, base)?, names()),
     }
 }
 
@@ -413,11 +435,11 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         base,
         causality: of.causality,
         variability: of.has_variability.then_some(of.variability),
-        unit: of.unit.clone(),
+        unit: given(&of.unit),
         min: of.min,
         max: of.max,
         declared_type: of.declared_type.clone(),
-        display_unit: of.display_unit.clone(),
+        display_unit: given(&of.display_unit),
         is_relative: of.is_relative,
         depends_on: None,
         description: of.description.clone(),
@@ -464,4 +486,37 @@ fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [V
             variables[own].derivative_of = Some(state);
         }
     }
+}
+
+/// Adds the aliases of all variables. `spans` contains the range in `variables` for each variable of the file.
+fn add_aliases(
+    written: &ModelDescription,
+    spans: &[Range<usize>],
+    arrays: &Arrays,
+    variables: &mut Vec<Variable>,
+) {
+    for (span, of) in spans.iter().zip(&written.variables) {
+        let array = variables.get(span.start).and_then(|first| arrays.find(first.reference));
+        for alias in &of.aliases {
+            let Some(first) = variables.get(span.start).filter(|_| !span.is_empty()) else { continue };
+            let attributes = Arc::new(Attributes {
+                display_unit: given(&alias.display_unit).or_else(|| first.display_unit.clone()),
+                description: alias.description.clone(),
+                ..(*first.attributes).clone()
+            });
+            for (number, own) in span.clone().enumerate() {
+                let name = match array {
+                    Some((index, _)) => arrays.all()[index].name(&alias.name, number),
+                    None => alias.name.clone(),
+                };
+                let attributes = Arc::clone(&attributes);
+                variables.push(Variable { name, attributes, ..variables[own].clone() });
+            }
+        }
+    }
+}
+
+/// Returns a unit that is given: some tools write `unit=""` for a variable without a unit.
+fn given(unit: &Option<Arc<str>>) -> Option<Arc<str>> {
+    unit.clone().filter(|unit| !unit.is_empty())
 }

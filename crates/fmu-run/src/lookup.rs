@@ -3,6 +3,7 @@
 use crate::connector::{Connector, End};
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
+use crate::system::joined;
 use fmi_abi::{BaseType, Causality, Variability};
 
 /// A variable of a component that was found by its name.
@@ -12,8 +13,8 @@ pub(crate) struct Found<'a> {
     pub component: usize,
     pub variable: &'a Variable,
     pub description: &'a Description,
-    /// Name of the output that is connected to the variable.
-    pub source: Option<&'a str>,
+    /// The output that is connected to the variable: names of its component and in its FMU.
+    pub source: Option<(&'a str, &'a str)>,
     /// The connector of the system by whose name the variable was found, and its connection to the variable.
     pub connector: Option<(&'a Connector, &'a End)>,
 }
@@ -33,7 +34,9 @@ impl Found<'_> {
             return request(format!("{name} is an output of the system, it cannot be set"));
         }
         match self.source {
-            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
+            Some((component, output)) => {
+                request(format!("{name} is fed by {}, it cannot be set", joined(component, output)))
+            }
             None => Ok(()),
         }
     }

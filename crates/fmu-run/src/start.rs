@@ -44,8 +44,10 @@ impl<'a> StartValues<'a> {
     /// Returns the given start values, and the system's own start values of all other variables.
     pub fn of(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
-        for (name, value) in system.start() {
-            all.put(StartValues::found(system, name, Start::Value(value))?.into_owned());
+        for own in system.own_start() {
+            let (found, name, value) = own?;
+            found.check_start(&name)?;
+            all.put(StartValues::found(&[found], &name, Start::Value(value))?.into_owned());
         }
         all.put(Self::given(system, given)?);
         Ok(all)
@@ -58,7 +60,7 @@ impl<'a> StartValues<'a> {
             if given[..index].iter().any(|(before, _)| before == name) {
                 return request(format!("{name} is twice among the start values"));
             }
-            all.put(Self::found(system, name, *start)?);
+            all.put(Self::found(&system.find_startable(name)?, name, *start)?);
         }
         Ok(all)
     }
@@ -96,10 +98,10 @@ impl<'a> StartValues<'a> {
         StartValues { numbers: self.numbers.into_iter().map(own).collect(), values: self.values }
     }
 
-    /// Looks up a name and converts its start value to the types of its variables.
-    fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
+    /// Converts a start value to the types of the variables that a name denotes.
+    fn found(variables: &[Found], name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
-        for found in system.find_startable(name)? {
+        for found in variables.iter().copied() {
             let target = Target::of(found);
             if is_exact(target.base) {
                 let values = match start {
@@ -200,7 +202,7 @@ pub(crate) fn number_of(found: Found, name: &str, value: &Value) -> Result<f64, 
     let Some(items) = found.description.items(found.variable) else {
         return request(format!("{name} is {}, its start value cannot be {text:?}", kind()));
     };
-    let number = items.iter().find(|(item, _)| item == text).and_then(|(_, number)| number.parse().ok());
+    let number = items.iter().find(|(item, _)| item == text).map(|(_, number)| *number as f64);
     let known = || items.iter().map(|(item, _)| item.as_str()).collect::<Vec<_>>().join(", ");
     number.ok_or_else(|| {
         Error::Request(format!("{name} is one of {}, its start value cannot be {text:?}", known()))

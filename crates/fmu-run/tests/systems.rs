@@ -104,6 +104,10 @@ fn wrong_systems_are_rejected() {
         ),
         (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
         (
+            |s| s.connections[0] = ("plant.u", "law.u"),
+            "the connection from plant.u to law.u is reversed: law.u is the output, and plant.u the input that it feeds",
+        ),
+        (
             |s| s.connections.push(("plant.delay", "law.r")),
             "plant.delay cannot feed law.r: the output is in s, the input in rad",
         ),
@@ -161,6 +165,9 @@ fn wrong_systems_are_rejected() {
     // An undeclared unit fits any unit.
     let mut without_unit = system(directory.path());
     without_unit.connections[1].0 = "plant.bare";
+    without_unit.check().unwrap();
+    // FMI 2.0 has the same functions for integers and enumerations.
+    without_unit.connections.push(("plant.gear_now", "law.n"));
     without_unit.check().unwrap();
 }
 

@@ -25,7 +25,7 @@ pub fn accepts_any_size(checker: &Checker, trajectory: &Trajectory) -> bool {
     let offer = checker.description.co_simulation.as_ref();
     trajectory.points.len() >= 4
         && checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"])
-        && offer.is_none_or(|offer| offer.number("fixedInternalStepSize").is_none())
+        && offer.is_none_or(|offer| offer.fixed_internal_step_size().is_none())
         && !checker.description.event_mode()
 }
 

@@ -212,7 +212,7 @@ pub fn cut(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     }
     // If the internal step size is fixed, half a step must still be a multiple of it, so the steps are twice as long.
     let offer = checker.description.co_simulation.as_ref();
-    let fixed = offer.and_then(|offer| offer.number("fixedInternalStepSize"));
+    let fixed = offer.and_then(|offer| offer.fixed_internal_step_size());
     let Point { time: start, size, .. } = trajectory.points[0];
     let size = size * if fixed.is_some() { 2.0 } else { 1.0 };
     let mut writer = checker.writer(trajectory);
@@ -281,7 +281,7 @@ pub fn time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
         let offer = description.co_simulation.as_ref();
         if offer.is_some_and(|offer| {
             offer.can(&["canHandleVariableCommunicationStepSize"])
-                && offer.number("fixedInternalStepSize").is_none()
+                && offer.fixed_internal_step_size().is_none()
         }) {
             runs.push((0.0, steps(description, first.time, &[0.77 * first.size; 4], false)));
         }

@@ -49,6 +49,7 @@ impl System {
         definition.loose.clone_from(&self.0.loose);
         definition.set_connections(self.0.connections.clone(), self.0.changes.clone());
         definition.start.clone_from(&self.0.start);
+        definition.warnings.clone_from(&self.0.warnings);
         definition.stop_time = self.0.stop_time;
         let system = match self.sole() {
             Some(_) => Self(Arc::new(definition)),

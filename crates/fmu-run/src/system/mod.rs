@@ -1,27 +1,28 @@
 //! Systems of connected FMUs.
 
 mod configured;
+mod definition;
 mod elements;
 mod order;
-#[cfg(feature = "write")]
 mod osp;
 mod ssp;
 #[cfg(feature = "write")]
 mod structure;
 
 use crate::change::Change;
-use crate::connector::Connector;
+use crate::connector::{Connector, Place};
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
 use crate::fmu::Loaded;
 use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
 use crate::pool::Pool;
-use crate::selection::Selection;
+use crate::selection::{Selection, Target};
+use crate::start::StartValues;
 pub use elements::Elements;
 use fmi_abi::description::{Fault, Offer};
 use fmi_abi::files::Limits;
-use fmi_abi::{BaseType, Causality, Interface, Value, shown};
+use fmi_abi::{BaseType, Causality, Interface, Value};
 pub(crate) use order::Exchange;
 pub use order::Order;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -50,13 +51,15 @@ struct Definition {
     connectors: BTreeMap<String, Connector>,
     /// Names of inputs and outputs of the system that no connection leads to an FMU.
     loose: HashSet<String>,
-    connections: Vec<(String, String)>,
+    /// Connections from outputs to inputs.
+    connections: Vec<(Place, Place)>,
     /// For each connection, the change of values on the way. Empty if units must be equal instead.
     changes: Vec<Change>,
-    /// Index of the first connection to each input.
-    sources: HashMap<String, usize>,
+    /// Index of the first connection to each input, which is identified by its component and its [key](Variable::key).
+    sources: HashMap<(usize, u64), usize>,
     exchange: Exchange,
-    start: Vec<(String, Value)>,
+    start: Vec<(Place, Value)>,
+    warnings: Vec<String>,
     stop_time: Option<f64>,
     pool: Pool,
     /// Arrays by name, found when they are first needed.
@@ -76,14 +79,20 @@ pub(crate) struct Component {
 pub struct Variables {
     own: Vec<(String, Variable)>,
     components: Vec<(String, Arc<Description>)>,
+    /// Variables to which the system gives other start values than their FMUs, by the indices of component and variable.
+    changed: HashMap<(usize, usize), Variable>,
 }
 
 impl Variables {
-    /// Returns the names and the variables: inputs and outputs of the system first, then variables of the components.
+    /// Returns the names and the variables: inputs and outputs of the system first, then variables of the components. Their start values
+    /// are those with which a run begins, so the system's count where it has any.
     pub fn iter(&self) -> impl Iterator<Item = (String, &Variable)> {
-        let of_components = self.components.iter().flat_map(|(component, description)| {
-            description.variables.iter().map(|of| (joined(component, &of.name), of))
-        });
+        let of_components =
+            self.components.iter().enumerate().flat_map(move |(component, (name, description))| {
+                description.variables.iter().enumerate().map(move |(index, of)| {
+                    (joined(name, &of.name), self.changed.get(&(component, index)).unwrap_or(of))
+                })
+            });
         self.own.iter().map(|(name, of)| (name.clone(), of)).chain(of_components)
     }
 }
@@ -112,11 +121,15 @@ impl System {
     pub fn connect(composition: &Composition) -> Result<Self, Error> {
         let components =
             composition.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
-        let connections =
-            composition.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
         let mut definition =
             Definition::of(composition.name, components.map(|(name, fmu)| Component { name, fmu }).collect());
-        definition.set_connections(connections.collect(), Vec::new());
+        definition.check_components()?;
+        let connections = composition
+            .connections
+            .iter()
+            .map(|(from, to)| Ok((definition.place(from)?, definition.place(to)?)));
+        let connections = connections.collect::<Result<_, Error>>()?;
+        definition.set_connections(connections, Vec::new());
         definition.finish(composition.order)
     }
 
@@ -133,10 +146,37 @@ impl System {
 
     /// Returns all variables with their names in the system.
     pub fn variables(&self) -> Variables {
-        let own =
-            self.0.connectors.iter().map(|(name, connector)| (name.clone(), connector.variable.clone()));
+        let starts = self.starts();
+        let start_of = |component: usize, of: &Variable| starts.get(&(component, of.key())).cloned();
+        let own = self.0.connectors.iter().map(|(name, Connector { variable, ends, .. })| {
+            let start = ends.first().and_then(|end| {
+                let found = self.0.at(end.place.component, &end.place.variable)?;
+                let own = start_of(found.component, found.variable).or_else(|| found.variable.start.clone());
+                if end.out.is_identity() { own } else { changed_text(found.variable, &own?, &end.out) }
+            });
+            (name.clone(), variable.starting_at(start))
+        });
         let of = |component: &Component| (component.name.clone(), Arc::clone(&component.fmu.description));
-        Variables { own: own.collect(), components: self.components().iter().map(of).collect() }
+        let given: HashSet<usize> = starts.keys().map(|(component, _)| *component).collect();
+        let changed = given.into_iter().flat_map(|component| {
+            let variables = self.components()[component].fmu.description.variables.iter().enumerate();
+            variables.filter_map(move |(index, of)| {
+                let start = start_of(component, of)?;
+                Some(((component, index), of.starting_at(Some(start))))
+            })
+        });
+        let changed = changed.collect();
+        Variables { own: own.collect(), components: self.components().iter().map(of).collect(), changed }
+    }
+
+    /// Returns the start values of the system as strings, by component and [key](Variable::key). If structural parameters have made them
+    /// invalid, there are none, and a run is an error.
+    fn starts(&self) -> HashMap<(usize, u64), Arc<str>> {
+        let all = StartValues::of(self, &[]).unwrap_or_default();
+        let key = |of: Target| (of.component, crate::description::key_of(of.base, of.reference));
+        let numbers = all.numbers(0).map(|(of, number)| (key(of), text_of(of.base, number)));
+        let values = all.values(0).map(|(of, value)| (key(of), Arc::from(&*value.to_string())));
+        numbers.chain(values).collect()
     }
 
     /// Returns the connections, from outputs to inputs, in the stages in which values are passed at a communication point.
@@ -147,8 +187,20 @@ impl System {
     }
 
     /// Returns the start values of the system by variable: numbers and strings.
-    pub fn start(&self) -> &[(String, Value)] {
-        &self.0.start
+    pub fn start(&self) -> impl Iterator<Item = (String, &Value)> {
+        self.0.start.iter().map(|(place, value)| (self.0.name_of(place), value))
+    }
+
+    /// Returns the start values of the system: the variable in its FMU, its name in the system, and the value.
+    pub(crate) fn own_start(&self) -> impl Iterator<Item = Result<(Found<'_>, String, &Value), Error>> {
+        let all = self.0.start.iter();
+        all.map(|(place, value)| Ok((self.0.existing(place)?, self.0.name_of(place), value)))
+    }
+
+    /// Returns what was strange when the system was opened: values that are not converted because a unit is not defined, and values that are
+    /// not used because they have no variable.
+    pub fn warnings(&self) -> &[String] {
+        &self.0.warnings
     }
 
     /// Returns the stop time of the system's experiment, s, if given.
@@ -183,7 +235,7 @@ impl System {
     /// # }
     /// ```
     pub fn array(&self, name: &str) -> Option<&Elements> {
-        if self.0.look_up(name).is_some() || self.0.connectors.contains_key(name) {
+        if !self.0.matches(name).is_empty() || self.0.connectors.contains_key(name) {
             return None;
         }
         let all = self.0.arrays.get_or_init(|| {
@@ -433,162 +485,25 @@ impl Fmu {
     }
 }
 
-impl Definition {
-    fn of(name: &str, components: Vec<Component>) -> Self {
-        let mut by_name = HashMap::new();
-        for (index, component) in components.iter().enumerate() {
-            by_name.entry(component.name.clone()).or_insert(index);
-        }
-        Self {
-            name: name.to_owned(),
-            lengths: by_name.keys().map(String::len).collect(),
-            by_name,
-            components,
-            connectors: BTreeMap::new(),
-            loose: HashSet::new(),
-            connections: Vec::new(),
-            changes: Vec::new(),
-            sources: HashMap::new(),
-            exchange: Exchange::default(),
-            start: Vec::new(),
-            stop_time: None,
-            pool: Pool::default(),
-            arrays: OnceLock::new(),
-        }
-    }
+/// Returns a number as the start value of a variable of this type.
+fn text_of(base: BaseType, number: f64) -> Arc<str> {
+    let value = match base {
+        BaseType::Boolean => Value::Boolean(number != 0.0),
+        base if base.is_float() => Value::Real(number),
+        _ => Value::Integer(number as i128),
+    };
+    value.to_string().into()
+}
 
-    /// Sets the connections. `changes` has a change for each of them, or is empty if units must be equal.
-    fn set_connections(&mut self, connections: Vec<(String, String)>, changes: Vec<Change>) {
-        self.sources.clear();
-        for (index, (_, to)) in connections.iter().enumerate() {
-            self.sources.entry(to.clone()).or_insert(index);
-        }
-        (self.connections, self.changes) = (connections, changes);
-    }
-
-    /// Checks the connections and sorts them into stages.
-    fn finish(mut self, order: Order) -> Result<System, Error> {
-        if self.components.is_empty() {
-            return request("a system needs at least one component".to_owned());
-        }
-        for (index, Component { name, fmu }) in self.components.iter().enumerate() {
-            if name.is_empty() {
-                return request("a component has no name".to_owned());
-            }
-            if self.by_name[name] != index {
-                return request(format!("two components are named {name}"));
-            }
-            fmu.library(Interface::CoSimulation)?;
-            if fmu.once_per_process(Interface::CoSimulation)
-                && self.components[..index].iter().any(|other| Arc::ptr_eq(&other.fmu, fmu))
-            {
-                return Err(Error::Fmu(format!(
-                    "{} can have only one instance per process (canBeInstantiatedOnlyOncePerProcess)",
-                    fmu.description.model_name
-                )));
-            }
-        }
-        let mut ends = Vec::new();
-        for (index, (from, to)) in self.connections.iter().enumerate() {
-            let (output, input) = (self.end(from, Causality::Output)?, self.end(to, Causality::Input)?);
-            let ((from_fmu, output_of), (to_fmu, input_of)) =
-                ((output.description, output.variable), (input.description, input.variable));
-            let checked = match self.changes.get(index) {
-                Some(change) => from_fmu.connects_by(change, output_of, to_fmu, input_of),
-                None => from_fmu.connects(output_of, to_fmu, input_of),
-            };
-            if let Err(why) = checked {
-                return request(format!("{from} cannot feed {to}: {why}"));
-            }
-            if matches!(output.variable.base, BaseType::String | BaseType::Binary) {
-                return request(format!("{from} cannot feed {to}: only numbers and Booleans are passed on"));
-            }
-            if self.sources[to] != index {
-                return request(format!("{to} is fed twice"));
-            }
-            ends.push((output, input));
-        }
-        let stages = order::stages(&self.connections, &ends, &self.changes, order)?;
-        self.exchange = Exchange { order, stages };
-        Ok(System(Arc::new(self)))
-    }
-
-    /// Finds the variable at one end of a connection, and checks its causality.
-    fn end(&self, name: &str, wanted: Causality) -> Result<Found<'_>, Error> {
-        let found = self.find(name)?[0];
-        match found.variable.causality {
-            causality if causality == wanted => Ok(found),
-            causality => request(format!("{name} is {causality}, not {wanted}")),
-        }
-    }
-
-    /// Finds a variable of a component by its name in the system.
-    fn look_up(&self, name: &str) -> Option<Found<'_>> {
-        let with = |component: usize, own: &str| {
-            let description = &self.components[component].fmu.description;
-            let source = self.sources.get(name).map(|index| self.connections[*index].0.as_str());
-            let variable = description.variable(own)?;
-            Some(Found { component, variable, description, source, connector: None })
-        };
-        match &*self.components {
-            [component] if component.name.is_empty() => with(0, name),
-            _ => {
-                // A name can be split at several dots, because names of components may contain dots. If several components match, the
-                // first one in the system is used.
-                let split = |length: &usize| {
-                    let (component, own) = (name.get(..*length)?, name.get(*length..)?.strip_prefix('.')?);
-                    Some((*self.by_name.get(component)?, own))
-                };
-                let mut candidates: Vec<_> = self.lengths.range(..name.len()).filter_map(split).collect();
-                candidates.sort_unstable();
-                candidates.into_iter().find_map(|(index, own)| with(index, own))
-            }
-        }
-    }
-
-    fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
-        let found: Vec<_> = match self.connectors.get(name) {
-            Some(connector) => {
-                let found =
-                    |end| Some(Found { connector: Some((connector, end)), ..self.look_up(&end.variable)? });
-                connector.ends.iter().filter_map(found).collect()
-            }
-            None => self.look_up(name).into_iter().collect(),
-        };
-        if !found.is_empty() {
-            return Ok(found);
-        }
-        if self.loose.contains(name) {
-            return request(format!(
-                "{name} is a connector that no connection leads to a variable of an FMU"
-            ));
-        }
-        let missing = self.components.iter().find_map(|component| {
-            let own = match component.name.as_str() {
-                "" => name,
-                of => name.strip_prefix(of)?.strip_prefix('.')?,
-            };
-            component.fmu.description.why_missing(own)
-        });
-        if let Some(why) = missing {
-            return request(format!("{name} {why}"));
-        }
-        let names = || {
-            let variables = self.components.iter().flat_map(|component| {
-                component.fmu.description.variables.iter().map(|of| joined(&component.name, &of.name))
-            });
-            variables.chain(self.connectors.keys().cloned())
-        };
-        let element = format!("{name}[");
-        let of_array = names().find(|known| known.starts_with(&element));
-        // Names that are too long for a message are not compared, because that takes long and they are rarely misspelled.
-        let is_short = name.len() <= fmi_abi::SHOWN;
-        let similar =
-            || is_short.then(|| nearest(name, names().filter(|known| known.len() <= fmi_abi::SHOWN)));
-        let hint = of_array.or_else(|| similar().flatten());
-        let hint = hint.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
-        request(format!("{} has no variable \"{}\"{hint}", shown(&self.name), shown(name)))
-    }
+/// Returns the start value of a connector: the start value of its variable after the change on the way. `None` if it is not a number.
+fn changed_text(of: &Variable, start: &str, change: &Change) -> Option<Arc<str>> {
+    let number = match Value::read(of.base, start)? {
+        Value::Real(number) => number,
+        Value::Integer(number) => number as f64,
+        Value::Boolean(value) => f64::from(u8::from(value)),
+        Value::String(_) | Value::Binary(_) => return None,
+    };
+    Some(text_of(of.base, change.apply(number)))
 }
 
 /// Returns the most similar name, if one is similar enough. Derivatives rank lower, because users rarely ask for them.
@@ -610,6 +525,7 @@ pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String
     names.reduce(|best, other| if other.0 > best.0 { other } else { best }).map(|(_, name)| name)
 }
 
-fn joined(component: &str, name: &str) -> String {
+/// Returns the name of a variable in a system.
+pub(crate) fn joined(component: &str, name: &str) -> String {
     if component.is_empty() { name.to_owned() } else { format!("{component}.{name}") }
 }

@@ -4,6 +4,7 @@ use crate::description::{Attributes, Description};
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
 use crate::start::{exact, number_of};
+use crate::system::definition::check_direction;
 use fmi_abi::write::{Element, unzip};
 use fmi_abi::{Causality, Value};
 use std::collections::BTreeMap;
@@ -98,7 +99,8 @@ impl<'a> SystemStructure<'a> {
             checked.find(from, Causality::Output)?;
         }
         for (from, to) in &self.connections {
-            let (a, b) = (checked.find(from, Causality::Output)?, checked.find(to, Causality::Input)?);
+            let (a, b) = (checked.variable(from)?, checked.variable(to)?);
+            check_direction([from, to], [a.variable, b.variable])?;
             let connects = a.description.connects(a.variable, b.description, b.variable);
             connects.map_err(|why| Error::Request(format!("{from} cannot feed {to}: {why}")))?;
             fed.push(*to);

@@ -251,6 +251,43 @@ fn a_state_of_a_system_is_one_instant() {
     }
 }
 
+/// A variable of FMI 3.0 may have several names (`Alias`), which are as good as the first one.
+#[test]
+fn aliases_are_names_of_variables() {
+    let unit = "<UnitDefinitions><Unit name=\"m\"><BaseUnit m=\"1\"/><DisplayUnit name=\"mm\" factor=\"1000\"/></Unit></UnitDefinitions>\
+        <DefaultExperiment";
+    let changes = [
+        ("<DefaultExperiment", unit),
+        (
+            "causality=\"input\" start=\"0\"/>\n    <Float64 name=\"y\" valueReference=\"2\" causality=\"output\"/>",
+            "causality=\"input\" start=\"0\" unit=\"m\"><Alias name=\"force\" displayUnit=\"mm\"/></Float64>\
+          <Float64 name=\"y\" valueReference=\"2\" causality=\"output\"><Alias name=\"way\"/></Float64>",
+        ),
+        ("<Dimension valueReference=\"13\"/>", "<Dimension valueReference=\"13\"/><Alias name=\"row\"/>"),
+    ];
+    let fmu = opened_with("plain", Standard::Fmi3, &changes);
+    let batch = Batch {
+        time: &times(),
+        inputs: vec![("force", Trajectory::Constant(2.0))],
+        start: vec![("row[2]", Start::Same(7.0))],
+        outputs: vec!["way", "y", "sum"],
+        every: Some(10),
+        ..Batch::default()
+    };
+    let runs = fmu.system().run(&batch, &Watch::default()).unwrap();
+    // y is 2 s after 1 s; the sum of 1, 7 and 3 does not change.
+    let ends: Vec<f64> =
+        runs.trajectories.iter().skip(1).step_by(2).map(|value| (value * 1e9).round()).collect();
+    assert_eq!(ends, [2e9, 2e9, 11e9]);
+    assert_eq!(fmu.system().display_unit("force", "mm").unwrap(), (1000.0, 0.0));
+    assert_eq!(fmu.system().array("row").map(|row| row.sizes.clone()), Some(vec![3]));
+    let connections = vec![("a.way", "b.force"), ("b.way", "b.u")];
+    let composition =
+        Composition { components: vec![("a", &fmu), ("b", &fmu)], connections, ..Composition::default() };
+    let why = System::connect(&composition).unwrap_err().to_string();
+    assert_eq!(why, "b.u is fed twice", "u and force are one input");
+}
+
 #[test]
 fn absurd_sizes_of_states_are_errors() {
     for standard in VERSIONS {

@@ -23,7 +23,8 @@ const CHANGES: [(&str, &str); 4] = [
     (
         "</ModelVariables>",
         "<ScalarVariable name=\"on\" valueReference=\"25\" causality=\"parameter\" variability=\"tunable\"><Boolean start=\"false\"/></ScalarVariable>\
-         </ModelVariables>",
+         <ScalarVariable name=\"b.u\" valueReference=\"1\" causality=\"input\" variability=\"continuous\"><Real start=\"0\" unit=\"deg\"/>\
+         </ScalarVariable></ModelVariables>",
     ),
 ];
 
@@ -134,7 +135,20 @@ fn outer_values_take_precedence() {
     );
     assert_eq!(of(&[], &[("n.a.gain", REAL[2]), ("n.a.gain", REAL[1])]), [6.0, 1.0]);
     // A parameter set may contain parameters of other systems.
-    assert_eq!(of(&[("gain", REAL[1])], &[("b.gain", REAL[2])]), [5.0, 1.0]);
+    let unused = [("gain", REAL[1]), ("b.gain", REAL[2])];
+    assert_eq!(of(&unused[..1], &unused[1..]), [5.0, 1.0]);
+    let system = binding(
+        "",
+        &unused,
+        "<ssd:ParameterMapping><ssm:MappingEntry source=\"K\" target=\"a.gain\"/></ssd:ParameterMapping>",
+    );
+    let warnings = |system: &str| {
+        let directory = written(&(system.to_owned() + &elements(&component("a", ""))), "", &[]);
+        opened(directory.path(), Order::Dependencies).unwrap().warnings().to_vec()
+    };
+    assert_eq!(warnings(&system), ["a mapping of the system has \"K\", which is no parameter"]);
+    let unknown = |name: &str| format!("the value of {name} is not used, because there is no such variable");
+    assert_eq!(warnings(&binding("", &unused, "")), ["gain", "b.gain"].map(unknown));
 }
 
 #[test]
@@ -197,13 +211,34 @@ fn start_values_have_units_and_sources_in_components() {
         ("source=\"p.ssv\" sourceBase=\"component\"", Ok(4.0)),
         ("source=\"../p.ssv\" sourceBase=\"component\"", Err("is outside of the archive")),
         ("source=\"stone.ssv\"", Err("u can be given in deg, not in \"stone\"")),
+        ("source=\"empty.ssv\"", Ok(3.0)),
+        (
+            "source=\"p.csv\" type=\"text/csv\"",
+            Err("a has a ParameterBinding of the type text/csv, which cannot be read"),
+        ),
+        ("source=\"missing.ssv\"", Err("there is no readable missing.ssv in it")),
     ] {
         let system = elements(&component("a", &bound(attributes)));
-        let stone = set("<ssv:Real value=\"3\" unit=\"stone\"/>");
-        let directory =
-            written(&system, "", &[("p.ssv", &of_system), ("m/p.ssv", &of_component), ("stone.ssv", &stone)]);
+        let stone = set("<ssv:Real value=\"3\" unit=\"stone\"/>").replace(
+            "<ssv:Units>",
+            "<ssv:Units><ssc:Unit name=\"stone\"><ssc:BaseUnit kg=\"1\" factor=\"6.35\"/></ssc:Unit>",
+        );
+        let empty = set("<ssv:Real value=\"3\" unit=\"\"/>");
+        let files = [
+            ("p.ssv", &*of_system),
+            ("m/p.ssv", &of_component),
+            ("stone.ssv", &stone),
+            ("empty.ssv", &empty),
+        ];
+        let directory = written(&system, "", &files);
         match (opened(directory.path(), Order::Dependencies), expected) {
-            (Ok(system), Ok(expected)) => assert_eq!(values(&system, &["a.u"]), [expected]),
+            (Ok(system), Ok(expected)) => {
+                assert_eq!((values(&system, &["a.u"]), system.warnings()), (vec![expected], &[][..]));
+                // The start value that is shown is the one that is in force.
+                let variables = system.variables();
+                let shown = variables.iter().find(|(name, _)| name == "a.u").unwrap().1.start.clone();
+                assert_eq!(shown.as_deref(), Some(&*expected.to_string()));
+            }
             (found, expected) => {
                 let (found, expected) = (found.unwrap_err().to_string(), expected.unwrap_err());
                 assert!(found.contains(expected), "{found}");
@@ -296,7 +331,7 @@ fn connections_have_directions_units_and_transformations() {
 fn wrong_connections_are_errors() {
     for (start, end, content, why) in [
         ("a.nope", "b.u", "", "S has no variable \"a.nope\""),
-        ("a.y", "zz.u", "", "S has no variable \"zz.u\""),
+        ("a.y", "zz.u", "", "a connection leads to zz.u, but there is no element zz"),
         ("a.y", "b.nope", "", "S has no variable \"b.nope\""),
         ("nope", "b.u", "", "S has no variable \"nope\""),
         ("a.y", "b.y", "", "has no direction: one is output, the other output"),
@@ -313,22 +348,36 @@ fn wrong_connections_are_errors() {
             "a.y",
             "b.u",
             "<ssc:LinearTransformation factor=\"x\"/>",
-            "factor of a LinearTransformation is \"x\", not a number",
+            "factor of LinearTransformation is \"x\", not a number",
         ),
         ("a.y", "b.u", "<ssc:OtherTransformation/>", "has the transformation OtherTransformation"),
         ("speed", "b.u", "", "speed cannot feed b.u: the output is in m/s, the input in deg"),
+        (
+            "b.y",
+            "a.ghost",
+            "",
+            "a.ghost is a connector, but not a variable of the FMU: S has no variable \"a.ghost\"",
+        ),
+        (
+            "out",
+            "out",
+            "",
+            "the connection between out and out has no direction: one is local, the other local",
+        ),
         ("n.out", "n.in", "", "form a circle"),
     ] {
         let nested = connectors(&[("in", "input", ""), ("out", "output", "")])
             + &connections(&[connection("in", "out", "")]);
-        let outer = connectors(&[("in", "input", ""), ("speed", "input", "m/s")])
+        let outer = connectors(&[("in", "input", ""), ("speed", "input", "m/s"), ("out", "local", "")])
             + &elements(
-                &(component("a", "")
+                &(component("a", &connectors(&[("ghost", "input", "")]))
                     + &component("b", "")
                     + &format!("<ssd:System name=\"n\">{nested}</ssd:System>")),
             )
             + &connections(&[connection(start, end, content)]);
-        let directory = written(&outer, "", &[]);
+        let speed =
+            "<ssd:Units><ssc:Unit name=\"m/s\"><ssc:BaseUnit m=\"1\" s=\"-1\"/></ssc:Unit></ssd:Units>";
+        let directory = written(&outer, speed, &[]);
         let found = opened(directory.path(), Order::Dependencies).unwrap_err().to_string();
         assert!(found.contains(why), "{start} to {end}: {found}");
     }
@@ -337,4 +386,172 @@ fn wrong_connections_are_errors() {
         written(&(elements(&(component("a", "") + &component("b", ""))) + &connections(&twice)), "", &[]);
     let found = opened(directory.path(), Order::Jacobi).unwrap_err().to_string();
     assert!(found.contains("b.u is fed twice"), "{found}");
+}
+
+/// Names of components and of variables may contain dots, so `a.b.u` may be the variable `b.u` of component `a` or the variable `u` of
+/// component `a.b`. A connection has both parts, so it leads to the right one. A name without them is an error.
+#[test]
+fn names_with_dots_are_not_confused() {
+    let source = component("s", &binding("", &[("gain", REAL[1])], ""));
+    let all = source + &component("a", "") + &component("a.b", "");
+    let connected = |end: &str| {
+        let (element, connector) = end.split_once('/').unwrap();
+        format!(
+            "<ssd:Connections><ssd:Connection startElement=\"s\" startConnector=\"y\" endElement=\"{element}\" \
+             endConnector=\"{connector}\"/></ssd:Connections>"
+        )
+    };
+    // s.y is 6 rad, 12 deg; an integrator with the input 12 has the output 12 after a second.
+    for (end, expected) in [("a.b/u", [0.0, 12.0]), ("a/b.u", [12.0, 0.0])] {
+        let directory = written(&(elements(&all) + &connected(end)), "", &[]);
+        let system = opened(directory.path(), Order::Dependencies).unwrap();
+        let mut one = system.instances(&Setup::default()).unwrap();
+        one.step(1.0, None).unwrap();
+        let mut found = [0.0; 2];
+        one.get(&system.select(&["a.y", "a.b.y"]).unwrap(), &mut found);
+        assert_eq!(found, expected, "{end}");
+        let why = system.select(&["a.b.u"]).unwrap_err().to_string();
+        let parts = "the variable b.u of component a and the variable u of component a.b";
+        assert_eq!(why, format!("a.b.u is ambiguous: it is {parts}; rename one of them"));
+    }
+    let bound = binding("", &[("a.b.u", REAL[0])], "") + &elements(&all);
+    let found = opened(written(&bound, "", &[]).path(), Order::Jacobi).unwrap_err().to_string();
+    assert!(found.contains("the parameter a.b.u is ambiguous"), "{found}");
+    let twice = elements(
+        &(component("n.c", "")
+            + &format!("<ssd:System name=\"n\">{}</ssd:System>", elements(&component("c", "")))),
+    );
+    let found = opened(written(&twice, "", &[]).path(), Order::Jacobi).unwrap_err().to_string();
+    assert!(found.contains("two elements are named n.c"), "{found}");
+}
+
+/// A value whose unit is not defined is taken as it is given, with a warning.
+#[test]
+fn undefined_units_are_warnings() {
+    let ends = connectors(&[("way", "input", "[m]")]);
+    let bound =
+        binding("", &[("u", "Real value=\"3\" unit=\"[m]\""), ("gain", "Real value=\"5\" unit=\"[m]\"")], "");
+    let system = ends
+        + &elements(&(component("a", &bound) + &component("b", "")))
+        + &connections(&[connection("way", "b.u", "")]);
+    let directory = written(&system, "", &[]);
+    let system = opened(directory.path(), Order::Dependencies).unwrap();
+    assert_eq!(
+        system.warnings(),
+        [
+            "the unit \"[m]\" is not defined, so values pass unconverted from way, in \"[m]\", to b.u, in \"deg\"",
+            "the value of a.u is in \"[m]\" and the variable in \"deg\", one of which is not defined, so the value is not converted",
+        ]
+    );
+    let mut one = system.instances(&Setup::default()).unwrap();
+    one.set(&system.select(&["way"]).unwrap(), &[7.0], None).unwrap();
+    let mut found = [0.0; 3];
+    one.get(&system.select(&["a.u", "b.u", "a.gain"]).unwrap(), &mut found);
+    // The gain has no unit, so its value is not converted (section 5.2.3 of SSP 1.0).
+    assert_eq!(found, [3.0, 7.0, 5.0]);
+}
+
+/// The start values of the system are those that variables show, also converted to the unit of a connector.
+#[test]
+fn start_values_in_force_are_shown() {
+    let ends = connectors(&[("half", "input", "half")]);
+    let bound = binding(
+        "",
+        &[
+            ("on", "Boolean value=\"1\""),
+            ("valve", "Integer value=\"30\""),
+            ("label", "String value=\"x\""),
+            ("u", "Real value=\"4\""),
+        ],
+        "",
+    );
+    let system = ends
+        + &elements(&(component("a", &bound) + &component("b", "")))
+        + &connections(&[connection("half", "a.u", "")]);
+    let units =
+        "<ssd:Units><ssc:Unit name=\"half\"><ssc:BaseUnit rad=\"1\" factor=\"2\"/></ssc:Unit></ssd:Units>";
+    let directory = written(&system, units, &[]);
+    let variables = opened(directory.path(), Order::Dependencies).unwrap().variables();
+    let starts: std::collections::HashMap<_, _> =
+        variables.iter().map(|(name, of)| (name, of.start.as_deref())).collect();
+    let of = |name: &str| starts[name];
+    assert_eq!(["a.on", "a.valve", "a.label"].map(of), [Some("true"), Some("30"), Some("x")]);
+    // 4 deg are 2 rad, 1 half; b.u is another name of the same input.
+    assert_eq!(["a.u", "a.b.u", "half"].map(of), [Some("4"), Some("4"), Some("1")]);
+    assert_eq!(
+        ["b.on", "b.valve", "b.label", "b.u"].map(of),
+        [Some("false"), Some("1"), Some("none"), Some("0")]
+    );
+}
+
+#[test]
+fn wrong_mappings_and_annotations() {
+    let missing = "<ssd:ParameterMapping source=\"missing.ssm\"/>";
+    for (mapping, why) in [
+        (missing, "there is no readable missing.ssm in it"),
+        (
+            "<ssd:ParameterMapping source=\"\"/>",
+            "a parameter mapping of the system has neither a source nor entries",
+        ),
+        (
+            "<ssd:ParameterMapping source=\"p.csv\" type=\"text/csv\"/>",
+            "the system has a ParameterMapping of the type text/csv",
+        ),
+    ] {
+        let system = binding("", &[("a.gain", REAL[0])], mapping) + &elements(&component("a", ""));
+        let found = opened(written(&system, "", &[]).path(), Order::Jacobi).unwrap_err().to_string();
+        assert!(found.contains(why), "{found}");
+    }
+    // Nothing is read from annotations, so a prefix in them need not be declared.
+    let annotation = "<ssd:Annotations><ssc:Annotation type=\"osp\"><osp:Simulation osp:x=\"1\"><other:y/></osp:Simulation></ssc:Annotation></ssd:Annotations>";
+    let system = elements(&component("a", "")) + annotation;
+    opened(written(&system, "", &[]).path(), Order::Jacobi).unwrap();
+}
+
+/// libcosim takes the output from the causalities, so the two variables of a connection have any order.
+#[test]
+fn systems_for_libcosim_are_opened() {
+    let variable =
+        |simulator: &str, name: &str| format!("<Variable simulator=\"{simulator}\" name=\"{name}\"/>");
+    let text = |ends: &str, rest: &str| {
+        format!(
+            "<OspSystemStructure xmlns=\"http://opensimulationplatform.com/MSMI/OSPSystemStructure\" version=\"0.1\">\
+             <StartTime>0.0</StartTime><EndTime> 2.5 </EndTime><Simulators><Simulator name=\"a\" source=\"m\"><InitialValues>\
+             <InitialValue variable=\"gain\"><Real value=\"6\"/></InitialValue><InitialValue variable=\"on\"><Boolean value=\"1\"/></InitialValue>\
+             <InitialValue variable=\"label\"><String value=\"x\"/></InitialValue></InitialValues></Simulator><Simulator name=\"b\" source=\"m\"/>\
+             </Simulators><Connections><VariableConnection>{ends}</VariableConnection>{rest}</Connections></OspSystemStructure>"
+        )
+    };
+    let directory = written("", "", &[]);
+    std::fs::remove_file(directory.path().join("SystemStructure.ssd")).unwrap();
+    let file = directory.path().join("OspSystemStructure.xml");
+    let open = |text: String, path: &Path| {
+        std::fs::write(&file, text).unwrap();
+        opened(path, Order::Jacobi)
+    };
+    let ends = variable("b", "valve") + &variable("a", "counter");
+    for path in [directory.path(), &file] {
+        let system = open(text(&ends, ""), path).unwrap();
+        assert_eq!(system.stop_time(), Some(2.5));
+        assert_eq!(system.stages(), [[("a.counter", "b.valve")]]);
+        // The counter is 0, and the valve without a connection would be 1.
+        assert_eq!(values(&system, &["a.gain", "a.on", "b.gain", "b.valve"]), [6.0, 1.0, 0.0, 0.0]);
+    }
+    let units = variable("a", "y") + &variable("b", "u");
+    for (text, why) in [
+        (text(&units, ""), "a.y cannot feed b.u: the output is in rad, the input in deg"),
+        (text(&variable("a", "y"), ""), "a VariableConnection has 1 variables, not 2"),
+        (
+            text(&(variable("a", "y") + &variable("c", "u")), ""),
+            "a connection leads to c, which is no simulator",
+        ),
+        (text(&(variable("a", "nope") + &variable("b", "u")), ""), "has no variable \"a.nope\""),
+        (text(&ends, "<SignalConnection/>"), "it has a SignalConnection, which cannot be run"),
+        (text(&ends, "").replace("value=\"6\"", "value=\"six\""), "value of Real is \"six\", not a number"),
+        (text(&ends, "").replace(" 2.5 ", "late"), "EndTime is \"late\", not a number"),
+        (text(&ends, "").replace("variable=\"gain\"", "variable=\"y\""), "a.y is read-only"),
+    ] {
+        let found = open(text, directory.path()).unwrap_err().to_string();
+        assert!(found.contains(why), "{found}");
+    }
 }

@@ -8,5 +8,8 @@ mod source;
 #[cfg(feature = "write")]
 mod write;
 
+pub(super) use read::{child, children, needed};
+pub(super) use source::Base;
+
 /// Type of the components that are FMUs.
 const FMU: &str = "application/x-fmu-sharedlibrary";

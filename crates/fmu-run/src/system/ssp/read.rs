@@ -4,72 +4,90 @@ use super::FMU;
 use super::source::Base;
 use crate::change::Change;
 use crate::error::Error;
+use crate::system::joined;
 use crate::unit::Unit;
+use fmi_abi::xml::attribute;
 use fmi_abi::{boolean, shown};
 use roxmltree::Node;
-use std::cell::Cell;
-use std::collections::HashMap;
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Maximum memory of names and parameters, in bytes, and number of comparisons. Names of nested systems are repeated for each element,
 /// several elements may refer to the same parameter file, and each parameter may have many mappings, so a small file may need much
 /// memory or time.
 const MOST: usize = 128 << 20;
 
+/// Maximum number of warnings.
+const WARNINGS: usize = 100;
+
+/// A connector of a system, or a connector or variable of a component: the index of the element and the name in it. They are not joined
+/// to one name, because both may contain dots.
+pub(super) type Place<'r> = (usize, &'r str);
+
+/// A system or component.
+pub(super) struct Element {
+    /// Name with the names of the systems around it; empty for the outer system.
+    pub name: String,
+    /// Index of the component; `None` for a system.
+    pub component: Option<usize>,
+}
+
 /// Content of `SystemStructure.ssd`.
 pub(super) struct Read<'r> {
     /// The file, for messages.
     pub path: &'r Path,
     pub base: Base<'r>,
-    /// Names of the components and paths of their FMUs, in the order of the file.
-    pub components: Vec<(String, PathBuf)>,
-    /// Connectors of systems and components by name.
-    pub connectors: HashMap<String, Declared>,
-    pub connections: Vec<Connection>,
+    /// Systems and components; the outer system is the first.
+    pub elements: Vec<Element>,
+    /// Indices of the elements by name.
+    by_name: HashMap<String, usize>,
+    /// Lengths of the names of the elements, in bytes.
+    lengths: BTreeSet<usize>,
+    /// Indices of the components among the elements and paths of their FMUs, in the order of the file.
+    pub components: Vec<(usize, PathBuf)>,
+    /// Connectors of systems and components.
+    pub connectors: HashMap<Place<'r>, Declared<'r>>,
+    pub connections: Vec<Connection<'r>>,
     /// Bindings of inner elements precede those of their system, whose values replace theirs (section 5.2.3 of SSP 1.0).
     pub bindings: Vec<Binding<'r>>,
     pub units: Units,
     /// Items of enumerations by name.
-    pub enumerations: HashMap<String, Vec<(String, String)>>,
+    pub enumerations: HashMap<String, Vec<(String, i64)>>,
     /// Number of bytes that may still be read, or comparisons that may still be made.
     remaining: Cell<usize>,
+    /// What was read, but is strange.
+    warnings: RefCell<Vec<String>>,
 }
 
 /// A parameter binding of a system or a component.
 pub(super) struct Binding<'r> {
     pub node: Node<'r, 'r>,
-    /// Name of the system or component, which ends with a dot or is empty.
-    pub path: String,
-    /// Index of the component, unless it is the binding of a system.
-    pub component: Option<usize>,
+    /// Index of the system or component.
+    pub element: usize,
 }
 
 /// Definitions of units by name.
 pub(super) type Units = HashMap<String, Unit>;
 
 /// A connector as declared in the file.
-pub(super) struct Declared {
+pub(super) struct Declared<'r> {
     /// `input`, `output`, `parameter` and so on; empty if missing.
-    pub kind: String,
-    pub unit: Option<Arc<str>>,
-    pub enumeration: Option<String>,
-    /// Whether it belongs to a system, not to a component.
-    pub is_of_system: bool,
-    /// Whether it belongs to the outer system.
-    pub is_outer: bool,
+    pub kind: &'r str,
+    pub unit: Option<&'r str>,
+    pub enumeration: Option<&'r str>,
 }
 
 /// A connection as written in the file.
-pub(super) struct Connection {
-    pub ends: [Endpoint; 2],
+pub(super) struct Connection<'r> {
+    pub ends: [Endpoint<'r>; 2],
     pub suppress_conversion: bool,
     pub transformation: Option<Transformation>,
 }
 
 /// A connector at one end of a connection.
-pub(super) struct Endpoint {
-    pub name: String,
+pub(super) struct Endpoint<'r> {
+    pub place: Place<'r>,
     /// Whether it belongs to the system that has the connection, not to one of its elements.
     pub is_own: bool,
 }
@@ -82,29 +100,53 @@ pub(super) enum Transformation {
 }
 
 impl<'r> Read<'r> {
-    pub fn of(path: &'r Path, base: Base<'r>, root: Node) -> Self {
-        let item =
-            |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
-        let enumerations = children(root, "Enumerations").filter_map(|of| {
-            let items = of.children().filter(Node::is_element).filter_map(item).collect();
-            Some((of.attribute("name")?.to_owned(), items))
+    /// Reads what a file defines for all of its systems: units and enumerations.
+    pub fn of(path: &'r Path, base: Base<'r>, root: Node) -> Result<Self, String> {
+        let item = |item: Node| {
+            let number = attribute(item, "value")?.ok_or_else(|| "an item lacks its value".to_owned())?;
+            Ok((needed(item, "name")?.to_owned(), number))
+        };
+        let enumerations = children(root, "Enumerations").map(|of| {
+            let items =
+                of.children().filter(|of| of.is_element() && of.tag_name().name() == "Item").map(item);
+            Ok((needed(of, "name")?.to_owned(), items.collect::<Result<_, String>>()?))
         });
-        Self {
+        Ok(Self {
             path,
             base,
+            elements: vec![Element { name: String::new(), component: None }],
+            by_name: HashMap::new(),
+            lengths: BTreeSet::new(),
             components: Vec::new(),
             connectors: HashMap::new(),
             connections: Vec::new(),
             bindings: Vec::new(),
-            units: units(root),
-            enumerations: enumerations.collect(),
+            units: units(root)?,
+            enumerations: enumerations.collect::<Result<_, String>>()?,
             remaining: Cell::new(MOST),
-        }
+            warnings: RefCell::default(),
+        })
     }
 
     /// Returns an error of the file.
     pub fn fail(&self, why: &str) -> Error {
         Error::Fmu(format!("{}: {why}", self.path.display()))
+    }
+
+    /// Adds a warning.
+    pub fn warn(&self, why: impl FnOnce() -> String) {
+        let mut all = self.warnings.borrow_mut();
+        if all.len() < WARNINGS {
+            all.push(why());
+        }
+    }
+
+    /// Returns the warnings, each once.
+    pub fn take_warnings(&self) -> Vec<String> {
+        let mut all = self.warnings.take();
+        let mut known = HashSet::new();
+        all.retain(|why| known.insert(why.clone()));
+        all
     }
 
     /// Subtracts bytes or comparisons from the number that remains. Fails if too few remain.
@@ -115,87 +157,139 @@ impl<'r> Read<'r> {
         Ok(())
     }
 
-    /// Returns the full name of an element. `path` is the name of its system, which ends with a dot or is empty.
-    fn name(&self, path: &str, name: &str) -> Result<String, String> {
-        self.take(path.len() + name.len() + size_of::<String>())?;
-        Ok(format!("{path}{name}"))
+    /// Returns the name of a connector or variable in the system.
+    pub fn name_of(&self, (element, name): Place) -> String {
+        joined(&self.elements[element].name, name)
     }
 
-    /// Reads a system. The names of its elements begin with `path`. The recursion is limited, because the XML parser limits the depth
-    /// of the file.
-    pub fn system(&mut self, node: Node<'r, 'r>, path: &str) -> Result<(), String> {
-        self.connectors(node, path, true)?;
-        for element in children(node, "Elements") {
-            let name = self.name(path, needed(element, "name")?)?;
-            match element.tag_name().name() {
-                "System" => self.system(element, &format!("{name}."))?,
-                "Component" => self.component(element, name)?,
-                other => return Err(format!("{} is a {}, which cannot be run", shown(&name), shown(other))),
+    /// Adds an element of a system, and returns its index.
+    fn element(&mut self, system: usize, name: &str) -> Result<usize, String> {
+        let path = &self.elements[system].name;
+        self.take(2 * (path.len() + name.len()) + size_of::<Element>() + size_of::<(String, usize)>())?;
+        let (name, index) = (joined(path, name), self.elements.len());
+        if self.by_name.insert(name.clone(), index).is_some() {
+            return Err(format!("two elements are named {}", shown(&name)));
+        }
+        self.lengths.insert(name.len());
+        self.elements.push(Element { name, component: None });
+        Ok(index)
+    }
+
+    /// Reads the outer system.
+    pub fn outer_system(&mut self, node: Node<'r, 'r>) -> Result<(), String> {
+        self.system(node, 0)
+    }
+
+    /// Reads a system. The recursion is limited, because the XML parser limits the depth of the file.
+    fn system(&mut self, node: Node<'r, 'r>, own: usize) -> Result<(), String> {
+        self.connectors(node, own)?;
+        for node in children(node, "Elements") {
+            let index = self.element(own, needed(node, "name")?)?;
+            match node.tag_name().name() {
+                "System" => self.system(node, index)?,
+                "Component" => self.component(node, index)?,
+                other => {
+                    let name = shown(&self.elements[index].name);
+                    return Err(format!("{name} is a {}, which cannot be run", shown(other)));
+                }
             }
         }
         for connection in children(node, "Connections") {
-            self.connection(connection, path)?;
+            self.connection(connection, own)?;
         }
-        self.bindings(node, path, None)
+        self.bindings(node, own)
     }
 
-    fn connectors(&mut self, node: Node, path: &str, is_of_system: bool) -> Result<(), String> {
+    fn connectors(&mut self, node: Node<'r, 'r>, element: usize) -> Result<(), String> {
         for connector in children(node, "Connectors") {
-            let name = self.name(path, needed(connector, "name")?)?;
-            let kind = connector.attribute("kind").unwrap_or_default().to_owned();
+            let place = (element, needed(connector, "name")?);
+            let kind = connector.attribute("kind").unwrap_or_default();
             let of_type = |name: &str, attribute| {
                 let of_type = connector.children().find(|of| of.tag_name().name() == name);
                 of_type.and_then(|of| of.attribute(attribute))
             };
-            let unit = of_type("Real", "unit").map(Arc::from);
-            let enumeration = of_type("Enumeration", "name").map(str::to_owned);
-            let is_outer = is_of_system && path.is_empty();
-            self.take(size_of::<Declared>() + kind.len())?;
-            self.connectors.insert(name, Declared { kind, unit, enumeration, is_of_system, is_outer });
+            let unit = of_type("Real", "unit").filter(|unit| !unit.is_empty());
+            let enumeration = of_type("Enumeration", "name");
+            self.take(size_of::<(Place, Declared)>())?;
+            if self.connectors.insert(place, Declared { kind, unit, enumeration }).is_some() {
+                return Err(format!("two connectors are named {}", shown(&self.name_of(place))));
+            }
         }
         Ok(())
     }
 
-    fn component(&mut self, element: Node<'r, 'r>, name: String) -> Result<(), String> {
+    fn component(&mut self, element: Node<'r, 'r>, index: usize) -> Result<(), String> {
         let source = needed(element, "source")?;
         let kind = element.attribute("type").unwrap_or(FMU);
+        let name = || shown(&self.elements[index].name);
         if kind != FMU {
             return Err(format!(
                 "component {} is not an FMU but {}, which cannot be run",
-                shown(&name),
+                name(),
                 shown(kind)
             ));
         }
-        let path = format!("{name}.");
-        self.connectors(element, &path, false)?;
-        self.bindings(element, &path, Some(self.components.len()))?;
-        let file = self.base.find(source).map_err(|why| format!("component {}: {why}", shown(&name)))?;
-        self.components.push((name, file));
-        Ok(())
+        let file = self.base.find(source).map_err(|why| format!("component {}: {why}", name()))?;
+        self.connectors(element, index)?;
+        self.elements[index].component = Some(self.components.len());
+        self.components.push((index, file));
+        self.bindings(element, index)
     }
 
-    fn connection(&mut self, connection: Node, path: &str) -> Result<(), String> {
-        let end = |side: &str| -> Result<Endpoint, String> {
+    fn connection(&mut self, connection: Node<'r, 'r>, system: usize) -> Result<(), String> {
+        let end = |side: &str| -> Result<Endpoint<'r>, String> {
             let connector = needed(connection, &format!("{side}Connector"))?;
             let element = connection.attribute(format!("{side}Element").as_str()).unwrap_or_default();
-            let dot = if element.is_empty() { "" } else { "." };
-            let name = self.name(path, &format!("{element}{dot}{connector}"))?;
-            Ok(Endpoint { name, is_own: element.is_empty() })
+            if element.is_empty() {
+                return Ok(Endpoint { place: (system, connector), is_own: true });
+            }
+            let name = joined(&self.elements[system].name, element);
+            self.take(name.len())?;
+            let Some(index) = self.by_name.get(&name) else {
+                let full = shown(&joined(&name, connector)).into_owned();
+                return Err(format!(
+                    "a connection leads to {full}, but there is no element {}",
+                    shown(&name)
+                ));
+            };
+            Ok(Endpoint { place: (*index, connector), is_own: false })
         };
         let ends = [end("start")?, end("end")?];
-        let suppress_conversion =
-            connection.attribute("suppressUnitConversion").and_then(boolean) == Some(true);
+        self.take(size_of::<Connection>())?;
+        let suppress_conversion = attribute(connection, "suppressUnitConversion")?.unwrap_or(false);
         let transformation = Transformation::of(connection)?;
         self.connections.push(Connection { ends, suppress_conversion, transformation });
         Ok(())
     }
 
-    fn bindings(&mut self, node: Node<'r, 'r>, path: &str, component: Option<usize>) -> Result<(), String> {
+    fn bindings(&mut self, node: Node<'r, 'r>, element: usize) -> Result<(), String> {
         for node in children(node, "ParameterBindings") {
-            self.take(path.len() + size_of::<Binding>())?;
-            self.bindings.push(Binding { node, path: path.to_owned(), component });
+            self.take(size_of::<Binding>())?;
+            self.bindings.push(Binding { node, element });
         }
         Ok(())
+    }
+
+    /// Returns what the name of a parameter can denote in an element: a connector or variable of it or, in a system, of the elements in
+    /// it, whose names precede the name of the connector. There are several if the name can be split at several dots. `exists` returns
+    /// whether there is such a connector or variable.
+    pub fn resolved<'n>(
+        &self,
+        element: usize,
+        name: &'n str,
+        exists: impl Fn(Place<'n>) -> bool,
+    ) -> Result<Vec<Place<'n>>, String> {
+        let path = &self.elements[element].name;
+        let full = joined(path, name);
+        let own = full.len() - name.len();
+        let mut found = Vec::from_iter(Some((element, name)).filter(|place| exists(*place)));
+        for length in self.lengths.range(own..).take_while(|length| **length < full.len()) {
+            self.take(*length)?;
+            let inner = full.get(..*length).and_then(|inner| self.by_name.get(inner));
+            let rest = name.get(length - own..).and_then(|rest| rest.strip_prefix('.'));
+            found.extend(inner.copied().zip(rest).filter(|place| exists(*place)));
+        }
+        Ok(found)
     }
 }
 
@@ -205,16 +299,9 @@ impl Transformation {
         let is_transformation = |node: &Node| node.tag_name().name().ends_with("Transformation");
         let Some(node) = node.children().find(is_transformation) else { return Ok(None) };
         let kind = node.tag_name().name();
-        let number = |name: &str, default| match node.attribute(name) {
-            None => Ok(default),
-            Some(text) => text
-                .trim()
-                .parse::<f64>()
-                .map_err(|_| format!("{name} of a {kind} is {:?}, not a number", shown(text))),
-        };
         if kind == "LinearTransformation" {
-            let change = Change::linear(number("factor", 1.0)?, number("offset", 0.0)?);
-            return Ok(Some(Self::Change(change)));
+            let (factor, offset) = (attribute(node, "factor")?, attribute(node, "offset")?);
+            return Ok(Some(Self::Change(Change::linear(factor.unwrap_or(1.0), offset.unwrap_or(0.0)))));
         }
         let entries = node.children().filter(Node::is_element);
         let pairs = entries.map(|entry| Ok([needed(entry, "source")?, needed(entry, "target")?]));
@@ -250,10 +337,10 @@ impl Transformation {
     }
 
     /// Returns the change of values between enumerations with these items.
-    pub fn change(&self, from: &[(String, String)], to: &[(String, String)]) -> Result<Change, String> {
-        let number = |items: &[(String, String)], name: &String| {
+    pub fn change(&self, from: &[(String, i64)], to: &[(String, i64)]) -> Result<Change, String> {
+        let number = |items: &[(String, i64)], name: &String| {
             let item = items.iter().find(|(item, _)| item == name);
-            let number = item.and_then(|(_, number)| number.trim().parse::<f64>().ok());
+            let number = item.map(|(_, number)| *number as f64);
             number.ok_or_else(|| format!("{} is not an item of the enumeration", shown(name)))
         };
         match self {
@@ -266,24 +353,31 @@ impl Transformation {
     }
 }
 
-/// Reads the definitions of units in an SSD or SSV file.
-pub(super) fn units(root: Node) -> Units {
-    let unit = |node: Node| {
-        let attributes = child(node, "BaseUnit")?.attributes();
-        let attributes: Vec<_> = attributes.map(|of| (of.name().to_owned(), of.value().to_owned())).collect();
-        Some((node.attribute("name")?.to_owned(), Unit::of(&attributes)?))
-    };
-    children(root, "Units").filter_map(unit).collect()
+/// Reads the definitions of units in an SSD or SSV file. A unit without a definition is left out.
+pub(super) fn units(root: Node) -> Result<Units, String> {
+    let mut units = Units::new();
+    for node in children(root, "Units") {
+        let Some(base) = child(node, "BaseUnit") else { continue };
+        let attributes: Vec<_> =
+            base.attributes().map(|of| (of.name().to_owned(), of.value().to_owned())).collect();
+        let name = needed(node, "name")?;
+        let unreadable =
+            || format!("the definition of the unit {} has a value that is not a number", shown(name));
+        if !attributes.is_empty() {
+            units.insert(name.to_owned(), Unit::of(&attributes).ok_or_else(unreadable)?);
+        }
+    }
+    Ok(units)
 }
 
-pub(super) fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+pub(in crate::system) fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.tag_name().name() == name)
 }
 
-pub(super) fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+pub(in crate::system) fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
 }
 
-pub(super) fn needed<'a>(node: Node<'a, 'a>, name: &str) -> Result<&'a str, String> {
+pub(in crate::system) fn needed<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
     node.attribute(name).ok_or_else(|| format!("a {} lacks {name}", shown(node.tag_name().name())))
 }

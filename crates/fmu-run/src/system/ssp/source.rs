@@ -5,7 +5,7 @@ use fmi_abi::shown;
 use std::path::{Component, Path, PathBuf};
 
 /// The directory of a system.
-pub(super) struct Base<'a> {
+pub(in crate::system) struct Base<'a> {
     pub directory: &'a Path,
     /// Whether the directory was unpacked from an archive.
     pub is_archive: bool,

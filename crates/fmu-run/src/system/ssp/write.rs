@@ -181,7 +181,7 @@ impl CheckedStructure<'_> {
 }
 
 /// Names and numbers of the items of an enumeration.
-type Items = [(String, String)];
+type Items = [(String, i64)];
 
 /// Returns the name and the items of the enumeration of a variable, if it has one.
 fn enumeration<'a>(of: Found<'a>) -> Option<(&'a str, &'a Items)> {
@@ -198,9 +198,8 @@ fn enumerations(variables: &[Found]) -> Result<Option<Element>, Error> {
         }
     }
     let element = |(name, items): (&str, &Items)| {
-        let item = |(name, value): &(String, String)| {
-            Element::new("ssc:Item").with("name", name).with("value", value)
-        };
+        let item =
+            |(name, value): &(String, i64)| Element::new("ssc:Item").with("name", name).with("value", value);
         Element::new("ssc:Enumeration").with("name", name).containing(items.iter().map(item))
     };
     Ok(list("ssd:Enumerations", known.into_iter().map(element).collect()))

@@ -1,7 +1,8 @@
 //! Writes systems for libcosim: a directory with `OspSystemStructure.xml` and the FMUs.
 
-use super::structure::{CheckedStructure, document, file_name, split};
+use super::STRUCTURE;
 use crate::error::Error;
+use crate::system::structure::{CheckedStructure, document, file_name, split};
 use fmi_abi::boolean;
 use fmi_abi::write::{Element, write_atomically};
 use std::io::Write;
@@ -14,7 +15,7 @@ impl CheckedStructure<'_> {
     /// Returns [`Error::Fmu`] if a file cannot be written.
     pub fn write_osp(&self, directory: &Path) -> Result<(), Error> {
         let text = document(&self.osp()?)?;
-        for (name, bytes) in self.files()?.into_iter().chain([("OspSystemStructure.xml", text.as_slice())]) {
+        for (name, bytes) in self.files()?.into_iter().chain([(STRUCTURE, text.as_slice())]) {
             write_atomically(&directory.join(name), |file| file.write_all(bytes)).map_err(Error::Fmu)?;
         }
         Ok(())
