@@ -187,6 +187,11 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     found = ssp.run(time, outputs=["pitch", "roll"])
     assert all(np.array_equal(found[name], expected[f"testbed.{name}"]) for name in ("pitch", "roll"))
     assert ssp.stop_time == 1.0 and ssp.variables["pitch_ref"].unit == "rad" and ssp.name == "prw_closed_loop"
+    # The start values that are shown, and from which sensitivities step, are those of the file.
+    shown = [ssp.variables[name].start for name in ("pitch_ref", "controller.pitch_ref", "testbed.use_omega")]
+    assert [float(shown[0]), float(shown[1]), shown[2]] == [*[np.deg2rad(30.0)] * 2, "true"]
+    slope = ssp.sensitivities(time[:401], outputs=["pitch"], parameters="pitch_ref")["pitch", "pitch_ref"]
+    assert abs(slope.flat[-1] - 1.0) < 0.02
     other = ssp.run(time, start={"pitch_ref": (10.0, "deg")}, inputs={"roll_ref": 0.0}, outputs=["pitch", "roll"])
     assert abs(np.rad2deg(other["pitch"][0, -1]) - 10.0) < 0.2 and np.abs(other["roll"][0, -1]) < 1e-3
 
@@ -230,11 +235,21 @@ def test_unsupported_ssps(old, new, message, tmp_path) -> None:
         fmu_run.System(built("prw_closed_loop.ssp"), {})
 
 
+def test_values_that_are_not_used_are_warnings(tmp_path) -> None:
+    def without(text: str) -> str:
+        return re.sub(r"<ssd:Connection startConnector=\"roll_ref\"[^>]*/>", "", text)
+
+    with pytest.warns(UserWarning, match="the value of roll_ref is not used, because it leads to no variable"):
+        fmu_run.System(rewritten(tmp_path, without)).close()
+
+
 def test_one_input_of_the_system_feeds_several(tmp_path) -> None:
     def both(text: str) -> str:
         return text.replace('startConnector="roll_ref"', 'startConnector="pitch_ref"')
 
-    with fmu_run.System(rewritten(tmp_path, both)) as loop:
+    with pytest.warns(UserWarning, match="the value of roll_ref is not used"):
+        system = fmu_run.System(rewritten(tmp_path, both))
+    with system as loop:
         one = loop.instances()
         one.set("pitch_ref", 0.25)
         assert list(one.get(["controller.pitch_ref", "controller.roll_ref"])[0]) == [0.25, 0.25]

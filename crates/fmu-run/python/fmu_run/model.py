@@ -38,7 +38,8 @@ class Variable:
     variability
         fixed, tunable, discrete, continuous and so on; None if not declared.
     start
-        Start value as a string, as it is written in the model description; None if not declared.
+        Start value as a string, as it is written in the model description; None if not declared. In a system from an SSP file, the
+        value that the file gives, if it gives one.
     unit
         Unit of the variable or of its declared type; None if not declared.
     description
@@ -247,7 +248,10 @@ class Model:
             condition = name[: -len(name.rpartition(".")[2])] + found[2]
             if condition not in self.variables or (found[1] or interface)[0].lower() != interface[0]:
                 continue
-            value = start.get(condition, self.variables[condition].start or "false")
+            value = start.get(condition, self.variables[condition].start)
+            # Without a start value, it is unknown; as an input, it may become true.
+            if value is None or condition in inputs:
+                continue
             if not np.isin(np.asarray(value).astype(str), ("true", "True", "1", "1.0")).any():
                 self._warned.add(name)
                 why = f"{name} has no effect, because {condition} is false; add {condition!r}: True to start"
@@ -304,7 +308,9 @@ class Model:
         for name in names:
             if name not in self.variables:
                 raise ValueError(f"parameters: the FMU has no variable {name!r}")
-            value = given.pop(name, self.variables[name].start or "0")
+            value = given.pop(name, self.variables[name].start)
+            if value is None:
+                raise ValueError(f"{name} has no start value; give one, as in start={{{name!r}: 1.0}}")
             if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str):
                 value = self.converted(name, *value)
             array = numbers(name, float(value) if isinstance(value, str) else value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
@@ -37,6 +38,12 @@ class System(Model):
         For invalid arguments, invalid connections, and start values in an SSP file that do not fit its variables.
     FmuError
         If the file is not an SSP or has unsupported content, or if an FMU cannot be loaded or does not support Co-Simulation.
+
+    Warns
+    -----
+    UserWarning
+        For each value of an SSP file that is not converted, because its unit or the unit of its variable is not defined, and for each that
+        is not used, because it has no variable.
     """
 
     def __init__(
@@ -55,7 +62,9 @@ class System(Model):
             raise ValueError("an SSP has its own connections; give connections with FMUs only")
         else:
             super().__init__(Loaded.ssp(source, order))
-        name, stages, stop_time = self._loaded.about_system()
+        name, stages, stop_time, strange = self._loaded.about_system()
+        for why in strange:
+            warnings.warn(why, UserWarning, stacklevel=2)
         #: str: name of the system.
         self.name = name
         #: list[list[tuple[str, str]]]: connections (output, input) in the stages in which values are passed at a communication point.

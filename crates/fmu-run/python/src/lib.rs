@@ -232,15 +232,15 @@ impl Loaded {
         ))
     }
 
-    /// Returns the name, the stages of the connections, and the stop time of a system.
-    fn about_system(&self) -> PyResult<(String, Stages, Option<f64>)> {
+    /// Returns the name, the stages of the connections, the stop time of a system, and what was strange when it was opened.
+    fn about_system(&self) -> PyResult<(String, Stages, Option<f64>, Vec<String>)> {
         let model = self.model()?;
         let system = model.system();
         let stages = system
             .stages()
             .into_iter()
             .map(|stage| stage.into_iter().map(|(from, to)| (from.to_owned(), to.to_owned())).collect());
-        Ok((system.name().to_owned(), stages.collect(), system.stop_time()))
+        Ok((system.name().to_owned(), stages.collect(), system.stop_time(), system.warnings().to_vec()))
     }
 
     /// Returns the variables, which stay available after `close`.
