@@ -58,6 +58,7 @@ fn of_types(attribute: &str, types: usize, letters: usize, variables: usize) -> 
             let item = format!("<Item name=\"{}\" value=\"1\"/>", "i".repeat(20)).repeat(letters / 40);
             format!("<SimpleType name=\"T{k}\"><Enumeration>{item}</Enumeration></SimpleType>")
         }
+        "min" => format!("<SimpleType name=\"T{k}\"><Real min=\"1.{}\"/></SimpleType>", "0".repeat(letters)),
         _ => format!("<SimpleType name=\"T{k}\"><Real {attribute}=\"{long}\"/></SimpleType>"),
     });
     let each = repeated(variables, |k| {

@@ -259,12 +259,14 @@ fn wrong_requests_are_rejected_in_one_line() {
     let file = parameter_file(directory.path(), "\"value\": 2.11", "\"value\": -2.11");
     let extreme = tempfile::tempdir().unwrap();
     let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
-    // Two libraries in the universal format of macOS, for Intel only: a header alone, and a header followed by the name of an
-    // FMI function.
-    let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
+    // Two universal libraries of macOS with a part for Intel: a header of a library without load commands alone, and followed by the name
+    // of an FMI function.
+    let part = [0xfeed_facf_u32, 0x0100_0007, 3, 6, 0, 0, 0, 0].map(u32::to_le_bytes).concat();
     let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
+        let size = (part.len() + content.len()) as u32;
+        let header = [0xcafe_babe, 1, 0x0100_0007, 3, 28, size, 2].map(u32::to_be_bytes).concat();
         let library = directory.path().join(name).with_extension("dylib");
-        fs::write(&library, [&header, content].concat()).unwrap();
+        fs::write(&library, [&header, &part, content].concat()).unwrap();
         library.to_str().unwrap().to_owned()
     });
     for (arguments, message) in [
