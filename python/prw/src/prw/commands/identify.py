@@ -80,6 +80,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     places = {
         "friction": "places with dry friction (N.m)",
         "backlash": "springs with backlash (rad), or the motors",
+        "clearance": "couplings that let go in a gap (rad)",
         "cubic": "springs with the torque k (twist + cubic twist^3), cubic in 1/rad2",
         "crosstalk": "torques to which the other one adds a share",
     }

@@ -63,6 +63,7 @@ def identify(
     gain: Sequence[str] = (),
     friction: Sequence[str] = (),
     backlash: Sequence[str] = (),
+    clearance: Sequence[str] = (),
     cubic: Sequence[str] = (),
     crosstalk: Sequence[str] = (),
     drift: Sequence[str] = (),
@@ -104,7 +105,10 @@ def identify(
         Where there is dry friction (N.m), which is then estimated, too: "shafts" (equal in both input shafts), "shaft1", "shaft2",
         "output" (equal about pitch and roll), "motor1", "motor2".
     backlash
-        Springs that have backlash (rad), "k1" or "k2" (equal on both sides), or "motors".
+        Springs that have backlash (rad), "k1" or "k2" (equal on both sides), or "motors". The dampers c1 and c2 have none.
+    clearance
+        Couplings that have clearance (rad), "k1" or "k2" (equal on both sides): neither spring nor damper acts in it, and the coupling
+        lets go when its torque would pull.
     cubic
         Springs with the torque k (twist + cubic twist^3), cubic in 1/rad^2: "k1", "k2".
     crosstalk
@@ -148,7 +152,15 @@ def identify(
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
         raise UserError("at least one is needed", argument="files")
-    places = {"delay": delay, "lag": lag, "gain": gain, "friction": friction, "backlash": backlash, "cubic": cubic}
+    places = {
+        "delay": delay,
+        "lag": lag,
+        "gain": gain,
+        "friction": friction,
+        "backlash": backlash,
+        "clearance": clearance,
+        "cubic": cubic,
+    }
     requested = {kind: names_of(kind, given) for kind, given in {**places, "crosstalk": crosstalk}.items()}
     drift = names_of("drift", drift)
     # There are many small matrices, with which more threads would be slower.

@@ -1,8 +1,12 @@
-"""Effects of real rigs that the FMU does not model: friction, backlash, cubic stiffness, and crosstalk of the torques.
+"""Effects of real rigs that the FMU does not model: friction, backlash, clearance, cubic stiffness, and crosstalk of the torques.
 
 The FMU is linear, so an effect adds its size times a pattern to the outputs. The pattern follows a law, for example the sign of a
 rate. It depends on the motion, and so weakly on the parameters and the sizes: the fit holds the patterns and repeats them at its
-result until both agree. Backlash and cubic stiffness of a spring act like a shift of the angle at the spring's end.
+result until both agree. Backlash, clearance and cubic stiffness of a coupling act like a shift of the angle at the spring's end.
+
+With backlash, only the spring has play. With clearance, the whole coupling does, and it lets go when its torque would pull the sides
+apart: for a twist e above half of the clearance, the torque k (e - clearance / 2) + c e' is at least 0. The shift is then -e - c e' / k plus
+the reaction of the massless shaft, so the part of the effect during which the coupling is open does not grow with the clearance.
 """
 
 from __future__ import annotations
@@ -23,6 +27,8 @@ from prw.testbed import OUTPUTS
 TURNING = 0.02
 #: Share of a spring's torque up to which the cubic part grows; without this limit, wrong data could make the motion unstable.
 LARGEST = 0.5
+#: Clearance in rad at which the pattern of a clearance is calculated that the motion does not contain.
+SMALL = 1e-4
 #: Time in s after which the states have forgotten how they began.
 SETTLED = 1.0
 #: Rounds in which the frictions of two shafts are adjusted to each other within a step.
@@ -39,35 +45,52 @@ class Law(NamedTuple):
     direct
         (8, m), change of OUTPUTS per unit.
     follows
-        (m, 6) and (m, 2), the signals that the effect follows, from the states and the motors' angles.
+        (q, 6) and (q, 4), the signals that the effect follows, from the states and from the motors' angles and rates.
     of
-        Effect (..., m) per unit of its size, from the signals (..., m) and the size. None for dry friction.
+        Effect (..., m) per unit of its size, from the signals (..., q) and the size. None for dry friction.
+    once
+        The same for the signals [q] of one instant, as a list [m], because numpy is slow for single numbers.
+    fixed
+        The part (..., m) of the effect that does not depend on its size, from the same arguments; None if there is none.
     """
 
     drive: Array
     direct: Array
     follows: tuple[Array, Array]
-    of: Callable[[Array, float], Array] | None
+    of: Callable[[Array, float], Array] | None = None
+    once: Callable[[list[float], float], list[float]] | None = None
+    fixed: Callable[[Array, float], Array] | None = None
 
 
 def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) -> Law | None:
     """The law of a mechanical effect, None for other distortions. values: parameters of the model in SI."""
     kind, place = distortion
-    rates, none = np.eye(6)[4:], np.zeros((2, 2))
+    rates, none = np.eye(6)[4:], np.zeros((2, 4))
     if kind == "friction" and not place.startswith("motor"):
         turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
         inertia = values["J2"] * np.eye(2) + turns.T @ np.diag([values["H3"], values["J3"]]) @ turns
         braked = {"shafts": np.eye(2), "shaft1": np.eye(2)[:1], "shaft2": np.eye(2)[1:], "output": turns}[place]
         drive = rates.T @ np.linalg.solve(inertia, braked.T)
-        return Law(drive, np.zeros((len(OUTPUTS), len(braked))), (braked @ rates, none[: len(braked)]), None)
+        return Law(drive, np.zeros((len(OUTPUTS), len(braked))), (braked @ rates, none[: len(braked)]))
     if place not in ("k1", "k2"):
         return None
-    of = _free if kind == "backlash" else _cubed
     if place == "k1":
-        return Law(model.B[:, :2], model.D[:, :2], (-np.eye(6)[:2], np.eye(2)), of)
-    # Angles 5 and 6 occur in the equations of motion and of the torques only as the ends of the springs k2.
-    direct = np.where(np.char.startswith(OUTPUTS, "tau")[:, None], -model.C[:, 2:4], 0.0)
-    return Law(-model.A[:, 2:4], direct, (np.eye(6)[:2] - np.eye(6)[2:4], none), of)
+        drive, direct, twist = model.B[:, :2], model.D[:, :2], (-np.eye(6)[:2], np.eye(2, 4))
+        rate = -model.A[:2], np.eye(2, 4, 2) - model.B[:2]
+    else:
+        # Angles 5 and 6 occur in the equations of motion and of the torques only as the ends of the springs k2.
+        direct = np.where(np.char.startswith(OUTPUTS, "tau")[:, None], -model.C[:, 2:4], 0.0)
+        drive, twist = -model.A[:, 2:4], (np.eye(6)[:2] - np.eye(6)[2:4], none)
+        rate = model.A[:2] - np.eye(6)[4:], model.B[:2]
+    if kind == "cubic":
+        return Law(drive, direct, twist, _cubed, _cubed_once)
+    if kind == "backlash":
+        return Law(drive, direct, twist, _free, _free_once)
+    other = {"k1": "c2", "k2": "c1"}[place]
+    reaction = (values["c1"] + values["c2"]) / values[other]
+    opening = [reaction * (e + values[f"c{place[1]}"] / values[place] * de) for e, de in zip(twist, rate)]
+    follows = np.vstack([twist[0], opening[0]]), np.vstack([twist[1], opening[1]])
+    return Law(drive, direct, follows, _let_go, _let_go_once, _open)
 
 
 def _free(twist: Array, size: float) -> Array:
@@ -75,11 +98,44 @@ def _free(twist: Array, size: float) -> Array:
     return -np.clip(twist / size, -0.5, 0.5) if size > 0 else -sign(twist) / 2
 
 
+def _free_once(twist: list[float], size: float) -> list[float]:
+    return [-min(max(e / size, -0.5), 0.5) for e in twist]
+
+
+def _let_go(signals: Array, size: float) -> Array:
+    """Shift of a spring's end per unit of clearance. signals: the twists (..., m), and minus the shifts with which the torques are 0."""
+    size = size if size > 0 else SMALL
+    twist, opening = np.split(signals, 2, axis=-1)
+    held = np.where(twist > 0, np.maximum(-opening, -size / 2), np.minimum(-opening, size / 2))
+    found: Array = np.where(np.abs(twist) > size / 2, held, -opening) / size
+    return found
+
+
+def _let_go_once(signals: list[float], size: float) -> list[float]:
+    m, half = len(signals) // 2, size / 2
+    return [
+        (max(-f, -half) if e > half else min(-f, half) if e < -half else -f) / size
+        for e, f in zip(signals[:m], signals[m:])
+    ]
+
+
+def _open(signals: Array, size: float) -> Array:
+    """The shift of `_let_go` where the coupling is open, else 0."""
+    shift = size * _let_go(signals, size)
+    found: Array = np.where(np.abs(shift) == size / 2, 0.0, shift)
+    return found
+
+
 def _cubed(twist: Array, size: float) -> Array:
     """Shift of a spring's end for a torque k (twist + size twist^3)."""
     reach = np.sqrt(LARGEST / abs(size)) if size else np.inf
     found: Array = np.clip(twist, -reach, reach) ** 3
     return found
+
+
+def _cubed_once(twist: list[float], size: float) -> list[float]:
+    reach = (LARGEST / abs(size)) ** 0.5
+    return [min(max(e, -reach), reach) ** 3 for e in twist]
 
 
 def sign(signal: Array) -> Array:
@@ -96,8 +152,9 @@ def columns(
     initial: Array,
     sizes: Mapping[Distortion, float],
     wanted: Iterable[Distortion],
-) -> dict[Distortion, Complex]:
-    """Contribution (f, c) of each wanted effect per unit of its size to the channels, at the frequencies of `response`.
+) -> tuple[dict[Distortion, Complex], Complex]:
+    """Contribution (f, c) of each wanted effect per unit of its size to the channels, at the frequencies of `response`; and the sum of
+    the parts that do not depend on the sizes.
 
     initial: (6,), see Comparison. sizes: of all effects that the motion contains; wanted ones without a size count as small."""
     count = len(experiment.time)
@@ -106,18 +163,35 @@ def columns(
     present = {d: size for d, size in sizes.items() if d in laws and (size > 0 or (size and d.kind == "cubic"))}
     moved, strengths = _moved(model.A * experiment.step, laws, present, states, experiment)
     contributions: dict[Distortion, Complex] = {}
+    constant: Complex = np.zeros_like(response.outputs)
+    motors, rows = (
+        np.hstack([experiment.theta, experiment.omega]),
+        [OUTPUTS.index(name) for name in experiment.channels],
+    )
     for d in wanted:
         if d not in laws:
             contributions[d] = _of_sensors(d, experiment, response, initial, sizes)
             continue
-        signals = moved @ laws[d].follows[0].T + experiment.theta @ laws[d].follows[1].T
-        of = laws[d].of
-        at = -sign(signals) if of is None else of(signals, sizes.get(d, 0.0))
-        during = strengths[d] if d in strengths else (at + np.roll(at, -1, axis=0)) / 2
+        signals = moved @ laws[d].follows[0].T + motors @ laws[d].follows[1].T
+        of, fixed, size = laws[d].of, laws[d].fixed, sizes.get(d, 0.0)
+        at = -sign(signals) if of is None else of(signals, size)
+        during = strengths[d] if d in strengths else _mean(at)
         _, gain = _held(model.A * experiment.step, laws[d].drive * experiment.step)
-        rows = [OUTPUTS.index(name) for name in experiment.channels]
-        contributions[d] = response.driven(spectra(during) @ gain.T, spectra(at) @ laws[d].direct[rows].T)
-    return contributions
+
+        def driven(during: Array, at: Array, gain: Array = gain, direct: Array = laws[d].direct[rows]) -> Complex:
+            return response.driven(spectra(during) @ gain.T, spectra(at) @ direct.T)
+
+        if fixed is not None and d in present:
+            growing = np.where(fixed(signals, size) == 0, at, 0.0)
+            constant += driven(size * (during - _mean(growing)), size * (at - growing))
+            at, during = growing, _mean(growing)
+        contributions[d] = driven(during, at)
+    return contributions, constant
+
+
+def _mean(values: Array) -> Array:
+    """Mean of the values (n, m) at the beginning and the end of each step."""
+    return (values + np.roll(values, -1, axis=0)) / 2
 
 
 def _of_sensors(
@@ -168,53 +242,59 @@ def _moved(
     (n, m). A: times the step. states: (n, 6) without effects."""
     if not sizes:
         return states, {}
-    steps, moved = {}, states.copy()
+    motors, stepped = np.hstack([experiment.theta, experiment.omega]), _held(A, np.zeros((6, 0)))[0]
+    towards, ends = np.vstack([np.eye(6), *(laws[d].follows[0] for d in sizes)]), [6]
+    steps = []
     for d, size in sizes.items():
-        stepped, gain = _held(A, laws[d].drive * experiment.step)
-        towards, of = laws[d].follows[0], laws[d].of
-        signals = states @ towards.T + experiment.theta @ laws[d].follows[1].T
-        steps[d] = size, size * gain, size * (towards @ gain), towards, of, signals
-    found = {d: np.zeros_like(signals) for d, (*_, signals) in steps.items()}
+        ends.append(ends[-1] + len(laws[d].follows[0]))
+        gain = towards @ (size * _held(A, laws[d].drive * experiment.step)[1])
+        signals = states @ laws[d].follows[0].T + motors @ laws[d].follows[1].T
+        part = slice(*ends[-2:])
+        steps.append(
+            (size, gain, gain[part], part, laws[d].once, signals.tolist(), np.zeros((len(states), gain.shape[1])))
+        )
+    # The shift of the states and of all signals at the end of a step, from the shift of the states at its beginning.
+    advance, shifts = towards @ stepped, np.zeros_like(states)
 
     def follow(first: int, shift: Array) -> Array:
         """Follows the effects from row `first`, where they have shifted the states by `shift`, to the end. Returns the last shift."""
-        before = {d: signals[first] + towards @ shift for d, (*_, towards, _, signals) in steps.items()}
-        moved[first] = states[first] + shift
+        ahead = towards @ shift
+        shifts[first] = shift
         for k in range(first, len(states) - 1):
-            ahead = stepped @ shift
-            for d, (size, gain, own, towards, of, signals) in steps.items():
-                expected = signals[k + 1] + towards @ ahead
-                if of is None:
-                    found[d][k] = _braked(before[d], expected, own)
+            now, ahead = ahead.tolist(), advance @ ahead[:6]
+            for size, gain, own, part, once, signals, found in steps:
+                before = [x + y for x, y in zip(signals[k], now[part])]
+                expected = [x + y for x, y in zip(signals[k + 1], ahead[part].tolist())]
+                if once is None:
+                    found[k] = _braked(before, expected, own)
                 else:
                     # During the step, the effect is about as large as in the step before.
-                    expected = expected + own @ found[d][k - 1]
-                    found[d][k] = (of(before[d], size) + of(expected, size)) / 2
-                ahead = ahead + gain @ found[d][k]
-            for d, (*_, towards, _, signals) in steps.items():
-                before[d] = signals[k + 1] + towards @ ahead
-            shift = ahead
-            moved[k + 1] = states[k + 1] + shift
-        return shift
+                    expected = [x + y for x, y in zip(expected, (own @ found[k - 1]).tolist())]
+                    found[k] = [(x + y) / 2 for x, y in zip(once(before, size), once(expected, size))]
+                ahead = ahead + gain @ found[k]
+            shifts[k + 1] = ahead[:6]
+        last: Array = shifts[-1]
+        return last
 
     # The spectra count the recording as periodic, so the first row follows the last one.
     last = follow(max(len(states) - int(SETTLED / experiment.step) - 1, 0), np.zeros(6))
     follow(0, stepped @ last)
-    return moved, found
+    moved: Array = states + shifts
+    return moved, {d: found for d, (*_, found) in zip(sizes, steps)}
 
 
-def _braked(before: Array, expected: Array, gain: Array) -> Array:
-    """Mean dry friction (m,) of unit size during a step. before: rates (m,) at its start; expected: rates at its end without
-    friction; gain: (m, m), change of these rates by the friction."""
-    m = len(before)
-    force, rate = [0.0] * m, expected.tolist()
+def _braked(before: list[float], rate: list[float], gain: Array) -> list[float]:
+    """Mean dry friction [m] of unit size during a step. before: rates [m] at its start; rate: rates at its end without friction;
+    gain: (m, m), change of these rates by the friction."""
+    m, change = len(before), gain.tolist()
+    force = [0.0] * m
     for _ in range(ADJUSTED if m > 1 else 1):
         for i in range(m):
-            free = rate[i] + sum(gain[i, j] * force[j] for j in range(m) if j != i)
-            force[i] = min(max(-free / gain[i, i], -1.0), 1.0)
+            free = rate[i] + sum(change[i][j] * force[j] for j in range(m) if j != i)
+            force[i] = min(max(-free / change[i][i], -1.0), 1.0)
     for i in range(m):
-        after = rate[i] + sum(gain[i, j] * force[j] for j in range(m))
+        after = rate[i] + sum(change[i][j] * force[j] for j in range(m))
         # A rate that passes through 0 within the step has each sign during a part of the step.
         if abs(force[i]) == 1 and before[i] * after < 0:
             force[i] *= (abs(after) - abs(before[i])) / (abs(after) + abs(before[i]))
-    return np.array(force)
+    return force

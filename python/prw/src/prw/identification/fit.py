@@ -349,8 +349,8 @@ class Fitter:
                 self._stepped[name] = max(self._stepped[name], float(e.channel_power[:, i].mean()))
         self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
-        #: The effects of each experiment (all_bins, c) per unit of their sizes, see `effects`.
-        self._effects: list[dict[Distortion, Complex]] = [{} for _ in experiments]
+        #: The effects of each experiment (all_bins, c), see `effects`.
+        self._effects: list[tuple[dict[Distortion, Complex], Complex | None]] = [({}, None) for _ in experiments]
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
@@ -358,13 +358,16 @@ class Fitter:
         models = self._discrete(self._models([logarithms]), experiment)
         effects = next(f for e, f in zip(self.experiments, self._effects) if e is experiment)
         model = Discrete(*(block[0] for block in models))
-        return Response(model, experiment, bins, self._unknowns(logarithms), effects)
+        return Response(model, experiment, bins, self._unknowns(logarithms), *effects)
 
     def _unknowns(self, logarithms: Array) -> dict[Distortion, float]:
         return dict(zip(self.task.distortions, logarithms[len(self.task.names) :].tolist()))
 
-    def effects(self, logarithms: Array, wanted: Sequence[Distortion]) -> list[dict[Distortion, Complex]]:
-        """For each experiment, the contributions (all_bins, c) of the wanted effects to the channels, per unit of their sizes."""
+    def effects(
+        self, logarithms: Array, wanted: Sequence[Distortion]
+    ) -> list[tuple[dict[Distortion, Complex], Complex]]:
+        """For each experiment, the contributions (all_bins, c) of the wanted effects to the channels, per unit of their sizes, and the
+        sum of their parts that do not depend on the sizes."""
         sizes = {d: d.value(x) for d, x in self._unknowns(logarithms).items() if d.kind not in FILTERS}
         (model,), values = self._models([logarithms]), self.task.values(logarithms)
         return [
@@ -376,7 +379,7 @@ class Fitter:
         """Repeat the patterns of the task's effects for the motion at this point."""
         wanted = [d for d in self.task.distortions if d.kind not in FILTERS]
         if wanted:
-            self._effects = self.effects(point, wanted)
+            self._effects = [*self.effects(point, wanted)]
             self._responses, self._comparisons = (b"", []), ((), [])
 
     def compare(self, logarithms: Array) -> list[Comparison]:

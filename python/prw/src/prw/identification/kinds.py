@@ -57,6 +57,13 @@ KINDS = {
         1e-3,
         belongs=True,
     ),
+    "clearance": Kind(
+        1e-3,
+        {"k1": "clearance of the couplings k1", "k2": "clearance of the couplings k2"},
+        "mrad",
+        1e-3,
+        belongs=True,
+    ),
     "cubic": Kind(
         100.0,
         {"k1": "cubic stiffness of the couplings k1", "k2": "cubic stiffness of the couplings k2"},

@@ -101,9 +101,10 @@ class Response:
         bins: int,
         distortions: Mapping[Distortion, float],
         effects: Mapping[Distortion, Complex] = {},
+        constant: Complex | None = None,
     ):
         """distortions: the unknown of each; channels that the experiment does not contain are ignored. effects: spectra (f, c) that
-        are added to the outputs per unit of a distortion's size, see `effects`."""
+        are added to the outputs per unit of a distortion's size, and `constant` regardless of the sizes, see `effects`."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
@@ -136,6 +137,7 @@ class Response:
                 self._added[k] = KINDS[distortion.kind].scale * effects[distortion][:bins]
         self.outputs *= self._filters
         self.outputs += np.tensordot(list(distortions.values()), self._added, 1) if distortions else 0.0
+        self.outputs += 0.0 if constant is None else constant[:bins]
         self.transients *= self._filters[..., None]
         self.transfer *= self._filters[..., None]
 

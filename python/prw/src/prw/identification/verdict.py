@@ -72,7 +72,7 @@ class Hypothesis(NamedTuple):
     @property
     def signs(self) -> bool:
         """Whether it follows the sign of a rate or a twist, and is never negative."""
-        return self.kind in ("friction", "backlash")
+        return self.kind in ("friction", "backlash", "clearance")
 
     @property
     def belongs(self) -> bool:
@@ -232,7 +232,7 @@ def judge(solution: Solution) -> Verdict:
                 reasons.append("the residual is about as large as the motion")
             if reasons:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(reasons)))
-        found = [(each, effects[i][d]) for each in additions for d in each.distortions if effects[i][d].any()]
+        found = [(each, effects[i][0][d]) for each in additions for d in each.distortions if effects[i][0][d].any()]
         for hypothesis, column in [*_rows(solution, i), *found]:
             fault = score(column[None, : experiment.needed_bins]).fault(hypothesis)
             if fault is not None:
