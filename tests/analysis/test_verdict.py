@@ -32,6 +32,11 @@ FAULTY_COLUMNS = {
         "tau1",
         "theta1, theta2 look as if they were in degrees",
     ),
+    "sign of a motor": (
+        lambda c: {"theta2": -c["theta2"]},
+        "tau2",
+        "theta2 has the wrong sign: all channels follow the FMU if the sign is changed",
+    ),
     "sign": (lambda c: {"theta3": -c["theta3"]}, "theta3", "theta3 has the wrong sign"),
     "swapped": (lambda c: {"tau1": c["tau2"], "tau2": c["tau1"]}, "tau2", "tau1 and tau2 are swapped"),
     "stuck": (
@@ -94,6 +99,8 @@ def test_a_faulty_column_is_named(experiment, fmu, fault):
     found = prw.identify({**columns, **change(columns)}, degrees=False, starts=1, fmu=fmu)
     assert channel in {misfit.channel for misfit in found.verdict.misfits}, found.misfits
     assert reported in found.diagnosis[0], found.diagnosis
+    if "is cut off" in reported:
+        assert "is cut off at -3" in found.diagnosis[1], "both ends are named"
 
 
 @pytest.mark.long

@@ -307,8 +307,10 @@ def _cause(trial: _Trial, solution: Solution, begin: str, then: str) -> Cause:
     kind, places = trial.hypothesis
     task = solution.task
     if trial.hypothesis == INERTIAS:
-        off = (np.exp(solution.logarithms[task.names.index(n)]) / task.start[n] - 1 for n in places)
-        sizes = ", ".join(f"{name} {100 * x:+.1f} %" for name, x in zip(places, off))
+        indices, errors = [task.names.index(n) for n in places], _errors(solution)
+        off = [np.exp(solution.logarithms[i]) / task.start[n] - 1 for i, n in zip(indices, places)]
+        # A combination of them may be known better than each.
+        sizes = ", ".join(f"{n} {100 * x:+.1f} +- {100 * errors[i]:.1g} %" for n, x, i in zip(places, off, indices))
         value: Any = dict.fromkeys(places, DRAWING)
         return Cause(f"{begin}the inertias differ from the start values ({sizes}): {then}", "priors", value)
     if kind == "drift":
@@ -324,7 +326,7 @@ def _cause(trial: _Trial, solution: Solution, begin: str, then: str) -> Cause:
 
 def _sizes(solution: Solution, distortions: tuple[Distortion, ...]) -> str:
     """The sizes of distortions of a fit; channels with equal sizes are listed together."""
-    errors = np.sqrt(np.diag(covariance_of(information_of(solution.jacobians) + solution.task.prior_information())))
+    errors = _errors(solution)
     sizes: dict[str, list[str]] = {}
     for distortion in distortions:
         i = solution.task.unknowns.index(str(distortion))
@@ -332,6 +334,13 @@ def _sizes(solution: Solution, distortions: tuple[Distortion, ...]) -> str:
         size, name = _size(distortion, distortion.value(x), float(errors[i]))
         sizes.setdefault(size, []).append(name)
     return "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
+
+
+def _errors(solution: Solution) -> Array:
+    """Standard errors (p,) of the unknowns."""
+    known = information_of(solution.jacobians) + solution.task.prior_information()
+    errors: Array = np.sqrt(np.diag(covariance_of(known)))
+    return errors
 
 
 def _size(distortion: Distortion, value: float, error: float) -> tuple[str, str]:
@@ -365,6 +374,9 @@ def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Itera
     if len(angles) > 1 and all(_slip(gains[0][j]) == 1 / 57.3 and likes[0][j, j] > UNLIKE for j in angles):
         yield "theta1, theta2 look as if they were in degrees, not radians"
         return
+    if turned := _turned(before, first, experiment, np.diag(likes[0])):
+        yield turned
+        return
     for j, name in enumerate(experiment.channels):
         column = experiment.values[:, j]
         pair = next((p for p in PAIRS if name in p and set(p) <= set(experiment.channels)), None)
@@ -386,6 +398,21 @@ def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Itera
         yield from _flat(name, experiment.sampled, column, speed > AT_REST * speed.max())
 
 
+def _turned(fitter: Fitter, point: Array, experiment: Experiment, likes: Array) -> str:
+    """A message if motors have the wrong sign, else an empty string: several channels then follow the FMU only if these motors turn the
+    other way. likes: (c,), correlations of the channels with the FMU's values. point: the parameters."""
+    unlike = likes < UNLIKE
+    for signs, which in (((-1, 1), "theta1 has"), ((1, -1), "theta2 has"), ((-1, -1), "theta1 and theta2 have")):
+        jumps = None if experiment.jumps is None else experiment.jumps * signs
+        other = replace(experiment, theta=experiment.theta * signs, omega=experiment.omega * signs, jumps=jumps)
+        outputs = Fitter(fitter.model, [other], fitter.task, fitter.noise).compare(point)[0].response.outputs
+        y, m = experiment.observed(outputs)[2:], experiment.measured[2:]
+        size = np.maximum(np.linalg.norm(y, axis=0) * np.linalg.norm(m, axis=0), 1e-150)
+        if unlike.sum() > 1 and (np.sum(y.conj() * m, axis=0).real / size > ALIKE).all():
+            return f"{which} the wrong sign: all channels follow the FMU if the sign is changed"
+    return ""
+
+
 def _slip(gain: float) -> float:
     return next((s for s in SLIPS if gain > 0 and abs(np.log(gain / s)) < np.log(TOLERANCE)), 0.0)
 
@@ -401,11 +428,14 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     usual = float(np.median(long))
     if usual > 2:
         return
+    saturated = False
     for level, side in ((column.max(), "above"), (column.min(), "below")):
         flats = (column[first] == level) & (long >= FLAT)
         if flats.sum() >= FLATS:
+            saturated = True
             yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and values {side} are lost"
-            return
+    if saturated:
+        return
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
         yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"

@@ -57,6 +57,8 @@ class Hypothesis(NamedTuple):
     def __str__(self) -> str:
         if self.kind in KINDS and KINDS[self.kind].places:
             return " and ".join(map(str, self.distortions))
+        if self.kind == "inertias":
+            return "inertias that differ from the start values"
         return f"{self.kind} of {' and '.join(self.places) if len(self.places) < 3 else 'all channels'}"
 
     @property
