@@ -12,6 +12,7 @@ the reaction of the massless shaft, so the part of the effect during which the c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -164,10 +165,8 @@ def columns(
     moved, strengths = _moved(model.A * experiment.step, laws, present, states, experiment)
     contributions: dict[Distortion, Complex] = {}
     constant: Complex = np.zeros_like(response.outputs)
-    motors, rows = (
-        np.hstack([experiment.theta, experiment.omega]),
-        [OUTPUTS.index(name) for name in experiment.channels],
-    )
+    motors = np.hstack([experiment.theta, experiment.omega])
+    rows = [OUTPUTS.index(name) for name in experiment.channels]
     for d in wanted:
         if d not in laws:
             contributions[d] = _of_sensors(d, experiment, response, initial, sizes)
@@ -216,11 +215,13 @@ def _of_sensors(
 
 def _played(theta: Array, size: float) -> Array:
     """Difference (n, 2) of the angle behind a play of `size` from the angle theta (n, 2), per unit of the size."""
-    behind, played = theta[0], np.empty_like(theta)
-    for k, angle in enumerate(theta):
-        behind = np.clip(behind, angle - size / 2, angle + size / 2)
-        played[k] = behind - angle
-    return played / size
+    half = size / 2
+    behind = [
+        list(accumulate(angles, lambda behind, angle: min(max(behind, angle - half), angle + half)))
+        for angles in theta.T.tolist()
+    ]
+    played: Array = (np.transpose(behind) - theta) / size
+    return played
 
 
 def _held(A: Array, drive: Array) -> tuple[Array, Array]:
