@@ -98,13 +98,12 @@ def test_with_a_finger_on_a_phone(visit: Any) -> None:
     touch = page.context.new_cdp_session(page)
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     scene = page.locator(".live-scene")
-    scene.scroll_into_view_if_needed()
     x, y = middle(scene)
     before = image(page)
-    swipe(touch, (x, y + 40), (120, 0))
+    swipe(touch, (x, y + 80), (120, 0))
     expect(page.locator("#live-theta1")).to_have_value("0")
     assert image(page) != before
-    swipe(touch, (x, y + 40), (-120, 0))
+    swipe(touch, (x, y + 80), (-120, 0))
     # A finger on a motor turns the motor, and the page does not scroll.
     motor, scrolled = find_part(page), page.evaluate("scrollY")
     swipe(touch, motor, (0, 60))

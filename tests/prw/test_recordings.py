@@ -314,11 +314,12 @@ def test_a_recording_with_measurements(tmp_path: Path) -> None:
         recording["roll"]
     with pytest.raises(UserError, match="units: yaw is not known; there are time, theta1"):
         read(path, units={"yaw": "deg"})
-    # A damaged measurement does not stop a simulation of the motors.
+    # A simulation compares the measurements, so it rejects a damaged one, too. The motors can be read without them.
     path.write_text(path.read_text().replace(",3,", ",broken,"))
-    assert prw.simulate(path)["roll"].shape == (3,)
-    with pytest.raises(UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
-        read(path)
+    for reader in (read, prw.simulate):
+        with pytest.raises(UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
+            reader(path)
+    assert prw.simulate(read_motion(path))["roll"].shape == (3,)
 
 
 def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:

@@ -369,6 +369,8 @@ class Trial {
       const chapter = this.guide.chapters[step];
       if (chapter) {
         this.follow(chapter, true);
+      } else {
+        this.view.settings?.forEach(({ set, preset }) => set(preset));
       }
     }
   }
