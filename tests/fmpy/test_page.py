@@ -110,7 +110,7 @@ def test_the_controllers_page_runs_it(controller):
 
 def test_it_is_small_and_loads_nothing(page):
     live = page[page.index("<style>\n.live,") :] + PACKED.sub("", script_of(page))
-    assert len(page.encode()) < 420e3 and len(zlib.compress(page.encode(), 9)) < 220e3
+    assert len(page.encode()) < 270e3 and len(zlib.compress(page.encode(), 9)) < 190e3
     assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", live)
 
 

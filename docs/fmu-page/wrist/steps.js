@@ -53,15 +53,16 @@ function isPreset({ value, preset }, name) {
 
 /** The paragraph of runs outside of the steps. @type {Part[]} */
 const LEAD = [
+  "Drag the gripper or a motor, choose a motion, or change a parameter. ",
   (facts) => {
     if (facts.motion) {
-      return `${facts.motion.title}. The steps above explain the machine; any other motion is in the list below.`;
+      return `${facts.motion.title}.`;
     }
     const [theta1, theta2] = [facts.value("theta1"), facts.value("theta2")];
     const [pitch, roll] = [(theta1 + theta2) / 2, (facts.value("N") / facts.value("M")) * ((theta1 - theta2) / 2)];
     const [isFirst, isSecond] = [theta1, theta2].map((angle) => Math.abs(angle) > REACH / DEGREE - 1e-6);
     const end = isFirst && isSecond ? " Both motors are at their ends." : isFirst || isSecond ? ` Motor ${isFirst ? 1 : 2} is at its end, so the wrist stops where it would have to go on.` : "";
-    return `Drag the gripper: up and down pitch it, left and right roll it, and the motors follow. For a pitch of ${degrees(pitch)} and a roll of ${degrees(roll)}, motor 1 must turn to ${degrees(theta1)} and motor 2 to ${degrees(theta2)}.${end}`;
+    return `Up and down pitch the gripper, left and right roll it, and the motors follow. For a pitch of ${degrees(pitch)} and a roll of ${degrees(roll)}, motor 1 must turn to ${degrees(theta1)} and motor 2 to ${degrees(theta2)}.${end}`;
   },
 ];
 
