@@ -324,20 +324,20 @@ class Trial {
     this.remember(false);
   }
 
-  /** Shows a step of the guide with the settings with which the reader has left it. @param {Chapter} chapter @param {boolean} isSame as in `remember` */
-  follow(chapter, isSame) {
+  /** Shows a step of the guide with the settings with which the reader has left it. Scrolling leaves the address as it is. @param {Chapter} chapter */
+  follow(chapter) {
     const last = this.guide.chapters[this.guide.chosen];
     if (last) {
       this.guide.left.set(last, String(this.settings()));
     }
     this.apply(new URLSearchParams(this.guide.left.get(chapter) ?? chapter.settings));
     this.isTouched = false;
-    this.remember(isSame);
   }
 
   /** Scrolls to a step and shows it. @param {Chapter} chapter */
   turnTo(chapter) {
-    this.follow(chapter, false);
+    this.follow(chapter);
+    this.remember(false);
     this.scrollTo(this.guide.chapters.indexOf(chapter));
   }
 
@@ -364,14 +364,22 @@ class Trial {
     const line = top + 0.5 * (innerHeight - top);
     // A reader who uses the controls keeps their run as long as they are in the window.
     const step = this.parts().filter((part) => part.getBoundingClientRect().top < (part === this.own && this.reached === this.guide.chapters.length ? innerHeight : line)).length - 1;
-    if (step >= 0 && step !== this.reached) {
-      this.reached = step;
-      const chapter = this.guide.chapters[step];
-      if (chapter) {
-        this.follow(chapter, true);
-      } else {
-        this.view.settings?.forEach(({ set, preset }) => set(preset));
-      }
+    if (step >= 0) {
+      this.arrive(step);
+    }
+  }
+
+  /** Shows the step to which a reader comes. The controls keep the run of the step before, but show the whole image. @param {number} step */
+  arrive(step) {
+    if (step === this.reached) {
+      return;
+    }
+    this.reached = step;
+    const chapter = this.guide.chapters[step];
+    if (chapter) {
+      this.follow(chapter);
+    } else {
+      this.view.settings?.forEach(({ set, preset }) => set(preset));
     }
   }
 
@@ -660,8 +668,10 @@ class Trial {
       own.append(element("h3", {}, "Your turn"), guide.lead, controls, this.controls(), ...more);
       player.element.append(guide.navigation, pane, element("div", { class: "live-story" }, ...guide.steps, own));
       for (const kind of ["pointerdown", "keydown", "input", "change"]) {
-        own.addEventListener(kind, () => (this.reached = guide.chapters.length));
+        own.addEventListener(kind, () => this.arrive(guide.chapters.length), { capture: true });
       }
+      // Back returns to the step of the address.
+      history.scrollRestoration = "manual";
       // A control that gets the focus is not scrolled below the image.
       new ResizeObserver(() => (document.documentElement.style.scrollPaddingTop = this.isStacked ? `${pane.offsetHeight + 8}px` : "")).observe(pane);
       addEventListener("scroll", () => requestAnimationFrame(() => this.scrolled()), { passive: true });
