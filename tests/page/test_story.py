@@ -53,7 +53,7 @@ def test_one_motor_does_both(visit: Any) -> None:
     expect(page.locator("[aria-pressed=true]")).to_have_text(STEPS[0])
     step(page, 2)
     expect(page.locator(".lead")).to_have_text(
-        "Two motors turn one shaft: in the same direction to pitch it, in opposite directions to roll it."
+        "Two motors turn one shaft: in the same direction to pitch it, in opposite directions to roll it. Manual"
     )
     expect(page.locator("[aria-pressed=true]")).to_have_text(STEPS[1])
     for angle, counts in [(20, {}), (37, {"M": 6}), (12, {"M": 5, "N": 5})]:
