@@ -1,5 +1,6 @@
 //! Attributes of a variable other than its type (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0), and of its dependencies.
 
+use crate::Standard;
 use std::fmt;
 
 // The tables of section 2.2.7 of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2. The exporter and the checker call the same functions, so
@@ -20,21 +21,28 @@ impl Causality {
     }
 
     /// Whether a variable of this causality and variability may have this `initial`; `None` if the attribute is missing and has no
-    /// default.
-    pub const fn permits_initial(self, variability: Variability, initial: Option<Initial>) -> bool {
+    /// default. Only FMI 3.0 lets an input state that its first value is the start value.
+    pub const fn permits_initial(
+        self,
+        standard: Standard,
+        variability: Variability,
+        initial: Option<Initial>,
+    ) -> bool {
         use Causality::*;
         use Initial::*;
         use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+        let is_stated_input = matches!((standard, self, initial), (Standard::Fmi3, Input, Some(Exact)));
         self.permits(variability)
-            && matches!(
-                (self, variability, initial),
-                (Parameter | StructuralParameter, _, Some(Exact))
-                    | (_, Constant, Some(Exact))
-                    | (Input, _, None | Some(Exact))
-                    | (Independent, _, None)
-                    | (CalculatedParameter | Local, Fixed | Tunable, Some(Calculated | Approx))
-                    | (Output | Local, Discrete | Continuous, Some(_))
-            )
+            && (is_stated_input
+                || matches!(
+                    (self, variability, initial),
+                    (Parameter | StructuralParameter, _, Some(Exact))
+                        | (_, Constant, Some(Exact))
+                        | (Input, _, None)
+                        | (Independent, _, None)
+                        | (CalculatedParameter | Local, Fixed | Tunable, Some(Calculated | Approx))
+                        | (Output | Local, Discrete | Continuous, Some(_))
+                ))
     }
 }
 

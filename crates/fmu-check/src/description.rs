@@ -140,7 +140,7 @@ impl Description {
                     format!("{other} and {name} have one reference and a start each"),
                 );
             }
-            wrong.extend(faults(variable));
+            wrong.extend(faults(self.standard, variable));
         }
         let independent = self.variables.iter().filter(|of| of.causality == Causality::Independent).count();
         if independent > 1 || independent == 0 && self.standard == Standard::Fmi3 {
@@ -263,7 +263,7 @@ fn early(written: &ModelDescription) -> HashSet<Handle> {
 }
 
 /// Returns the rules that a single variable breaks.
-fn faults(variable: &Variable) -> Vec<Observation> {
+fn faults(standard: Standard, variable: &Variable) -> Vec<Observation> {
     let (name, mut wrong) = (&variable.name, Vec::new());
     let mut add = |rule, why: String| wrong.push((rule, why));
     let Variable { causality, variability, initial, .. } = *variable;
@@ -271,7 +271,7 @@ fn faults(variable: &Variable) -> Vec<Observation> {
         // Clocks and clocked variables have other rules.
     } else if !causality.permits(variability) {
         add("description.combination", format!("{name} is {causality} and {variability}"));
-    } else if !causality.permits_initial(variability, initial) {
+    } else if !causality.permits_initial(standard, variability, initial) {
         let initial = initial.map_or_else(String::new, |initial| initial.to_string());
         let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
         add("description.combination", why);

@@ -7,7 +7,7 @@ use crate::value::{Dimensions, Place, Scalar};
 use fmi_abi::AllowedStates;
 use fmi_abi::BaseType;
 use fmi_abi::Value;
-use fmi_abi::{Causality, Initial, Variability};
+use fmi_abi::{Causality, Initial, Standard, Variability};
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
@@ -380,7 +380,8 @@ impl<M> Variable<M> {
         if !self.causality.permits(self.variability) {
             return Some("this causality does not permit this variability (section 2.2.7 of FMI 2.0)");
         }
-        if !self.causality.permits_initial(self.variability, self.initial) {
+        // What FMI 2.0 permits, FMI 3.0 permits, too.
+        if !self.causality.permits_initial(Standard::Fmi2, self.variability, self.initial) {
             return Some(
                 "this causality and variability do not permit this initial value (section 2.2.7 of FMI 2.0)",
             );

@@ -250,9 +250,10 @@ fn symbol_missing() {
 
 /// Faults of the description: FMI version, name of the finding, the string that is replaced, and the replacement.
 #[rustfmt::skip]
-const DESCRIPTIONS: [(u32, &str, &str, &str); 23] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str); 24] = [
     (2, "description.combination", r#""parameter" variability="fixed""#, r#""parameter" variability="discrete""#),
     (3, "description.combination", r#""input" variability"#, r#""input" initial="calculated" variability"#),
+    (2, "description.combination", r#""input" variability"#, r#""input" initial="exact" variability"#),
     (3, "description.combination", r#""output" variability="discrete""#, r#""output" variability="continuous""#),
     (2, "description.encoding", r#"encoding="UTF-8""#, r#"encoding="ISO-8859-1""#),
     (2, "dependencies.missing", r#"index="9" dependencies="4 5""#, r#"index="9" dependencies="5""#),
