@@ -55,11 +55,21 @@ impl Unknowns {
 
     /// Writes the calls of a snapshot.
     pub fn read(&self, writer: &mut Writer) -> Snapshot {
+        let vectors = self.read_vectors(writer);
+        Snapshot { reads: writer.read_these(0, &self.variables), vectors }
+    }
+
+    /// Writes the calls of a snapshot, those that read variables before all others.
+    pub fn read_variables_first(&self, writer: &mut Writer) -> Snapshot {
+        let reads = writer.read_these(0, &self.variables);
+        Snapshot { reads, vectors: self.read_vectors(writer) }
+    }
+
+    fn read_vectors(&self, writer: &mut Writer) -> Vec<(u32, usize)> {
         let names = [(writer.derivatives_name(), self.states), ("GetEventIndicators", self.indicators)];
         let vectors = names.into_iter().filter(|(_, count)| *count > 0);
         let mut vectors: Vec<(u32, usize)> =
             vectors.map(|(name, count)| (writer.vector(0, name, count), count)).collect();
-        let reads = writer.read_these(0, &self.variables);
         if let Some([unknowns, knowns]) = &self.directional {
             // The weights of the knowns differ, so that the effects of two knowns do not cancel.
             let seed: Vec<f64> = (0..knowns.len()).map(|index| 1.0 + 0.37 * index as f64).collect();
@@ -69,7 +79,7 @@ impl Unknowns {
                 count,
             ));
         }
-        Snapshot { reads, vectors }
+        vectors
     }
 
     /// Returns the name of each number of a snapshot, in the order of `numbers`.

@@ -23,6 +23,9 @@ struct PointSnapshots {
     after_event: Vec<Pair>,
     /// Pair of the rule dynamics.event-mode.
     in_event: [Pair; 1],
+    /// Snapshots of the rule dynamics.read-order, each read after the states were set: to some states, to other states with variables
+    /// before derivatives, to the first states with variables before derivatives, and to the other states.
+    orders: [Snapshot; 4],
     /// Snapshots with equal time, states and inputs, whose differences are the error of an iterative solver.
     repeated: [Snapshot; 3],
 }
@@ -44,7 +47,8 @@ fn states_after(checker: &Checker, trajectory: &Trajectory, at: &[usize]) -> any
 }
 
 /// Checks that unknowns are a function of time, states, inputs and discrete states. Their values after an event, after inputs were set, and
-/// in Event Mode after the last update must equal their values after the same time, states and inputs were set again.
+/// in Event Mode after the last update must equal their values after the same time, states and inputs were set again, and must not depend
+/// on which of them is read first.
 pub fn stale(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let Integrated { trajectory, chosen: mut at } = integrate_with_events(checker, trajectory)?;
     at.sort_unstable();
@@ -80,13 +84,14 @@ fn depend_on_arguments(
     }
     let names = unknowns.names(description);
     let compared = Arc::new(Compared { description: Arc::clone(description), unknowns, names, points: all });
-    let in_event = Arc::clone(&compared);
+    let [in_event, in_other_order] = [Arc::clone(&compared), Arc::clone(&compared)];
     let run = checker.evaluate("dynamics.stale", writer.sequence.clone(), move |run| {
         compared.first_difference(run, |point| &point.after_event)
     })?;
     checker.record("dynamics.event-mode", &run, &writer.sequence, move |run| {
         in_event.first_difference(run, |point| &point.in_event)
     });
+    checker.record("dynamics.read-order", &run, &writer.sequence, move |run| in_other_order.old_value(run));
     Ok(())
 }
 
@@ -127,10 +132,20 @@ fn write_point(writer: &mut Writer, unknowns: &Unknowns, point: &Point, states: 
     let before_completed = unknowns.read(writer);
     writer.complete_step(0);
     let after_completed = unknowns.read(writer);
+    let mut read_in_order = |by: f64, is_variables_first: bool| {
+        set_states(writer, by);
+        match is_variables_first {
+            true => unknowns.read_variables_first(writer),
+            false => unknowns.read(writer),
+        }
+    };
+    let orders = [(0.0, false), (1e-3, true), (0.0, true), (1e-3, false)]
+        .map(|(by, is_variables_first)| read_in_order(by, is_variables_first));
     PointSnapshots {
         time: point.time,
         repeated: [set_again.clone(), set_back.clone(), first_inputs_again.clone()],
         in_event: [(in_event, first_inputs_again.clone(), "in Event Mode after the last update")],
+        orders,
         after_event: vec![
             (after.clone(), set_again.clone(), "after an event"),
             (after, first_inputs_again.clone(), "after an event"),
@@ -168,18 +183,48 @@ impl Compared {
         magnitudes
     }
 
+    /// Returns the error of an iterative solver in each number at a point.
+    fn noise(&self, run: &Run, point: &PointSnapshots) -> Vec<Option<f64>> {
+        let [again, back, fresh] = point.repeated.each_ref().map(|snapshot| self.numbers(run, snapshot));
+        let noise = |index: usize| {
+            let fresh = fresh[index]?;
+            Some((again[index]? - fresh).abs().min((back[index]? - fresh).abs()))
+        };
+        (0..self.names.len()).map(noise).collect()
+    }
+
+    /// Describes the first number that keeps its value when the states are set, if derivatives were or were not read before it, although
+    /// it depends on the states.
+    fn old_value(&self, run: &Run) -> Option<String> {
+        self.points.iter().find_map(|point| {
+            let noise = self.noise(run, point);
+            let [before, variables_first, back, derivatives_first] =
+                point.orders.each_ref().map(|snapshot| self.numbers(run, snapshot));
+            (0..self.names.len()).find_map(|index| {
+                let (first, last) = (variables_first[index]?, derivatives_first[index]?);
+                let is_old = first == before[index]? || last == back[index]?;
+                let differs = (first - last).abs() > 100.0 * noise[index]? + 1e-9 * first.abs().max(last.abs());
+                (is_old && differs).then(|| {
+                    format!(
+                        "{} at {:?} is {first:?} if it is read before the derivatives, and {last:?} after them, with the same time, states \
+                         and inputs",
+                        self.names[index], point.time
+                    )
+                })
+            })
+        })
+    }
+
     /// Describes the first number that differs between the snapshots of a pair.
     fn first_difference(&self, run: &Run, pairs: impl Fn(&PointSnapshots) -> &[Pair]) -> Option<String> {
         let magnitudes = self.magnitudes(run);
         self.points.iter().find_map(|point| {
-            let repeated = point.repeated.each_ref().map(|snapshot| self.numbers(run, snapshot));
+            let noise = self.noise(run, point);
             pairs(point).iter().find_map(|(one, other, when)| {
                 let (one, other) = (self.numbers(run, one), self.numbers(run, other));
                 (0..self.names.len()).find_map(|index| {
                     let (is, must) = (one[index]?, other[index]?);
-                    let [again, back, fresh] = repeated.each_ref().map(|numbers| numbers[index]);
-                    let noise = (again? - fresh?).abs().min((back? - fresh?).abs());
-                    let allowed = TOLERANCE * magnitudes[index] + 100.0 * noise;
+                    let allowed = TOLERANCE * magnitudes[index] + 100.0 * noise[index]?;
                     ((is - must).abs() > allowed).then(|| {
                         format!(
                             "{} at {:?} is {is:?} {when}, and {must:?} with the same time, states and inputs later",

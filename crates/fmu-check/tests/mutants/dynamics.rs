@@ -59,6 +59,13 @@ fn event_modes_and_outputs() {
 }
 
 #[test]
+fn outputs_and_the_order_of_reading() {
+    for fault in ["output_with_derivatives", "output_outdated"] {
+        found(2, "dynamics", &[(fault, "dynamics.read-order", "y at ")]);
+    }
+}
+
+#[test]
 fn digits_and_partial_derivatives() {
     let faults = [
         ("parameter_single", "start_values.single", "k was set to"),
