@@ -81,6 +81,7 @@ def test_measured_columns_are_compared(prw: Any, tmp_path: Path) -> None:
     expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, motion.omega)
     error = np.where(np.arange(len(motion.time)) % 2, 1.0, -1.0)
     tau1, pitch = expected["tau1"] + 0.5 + 0.02 * error, np.rad2deg(expected["pitch"]) - 2
+    assert motion.omega is not None
     columns = np.column_stack([motion.time, motion.theta, motion.omega, tau1, pitch])
     rows = [",".join(f"{value:.17g}" for value in row) for row in columns]
     rows[4:9] = [row.rpartition(",")[0] + "," for row in rows[4:9]]
@@ -99,7 +100,10 @@ def test_measured_columns_are_compared(prw: Any, tmp_path: Path) -> None:
     run = simulate(tmp_path / "run.csv", fmu=built("prw_testbed.fmu"))
     np.testing.assert_array_equal(np.isnan(run.differences["pitch"]).nonzero()[0], np.arange(4, 9))
     measured = {axis.get_title(loc="left"): [line.get_ydata() for line in axis.lines[2:]] for axis in run.plot().axes}
-    (torques,), (angles,) = measured.pop("Sensor torques"), measured.pop("Pitch and roll angles")
+    (torques,), (angles,) = (
+        [np.asarray(line, dtype=np.float64) for line in measured.pop(title)]
+        for title in ("Sensor torques", "Pitch and roll angles")
+    )
     assert not any(measured.values())
     np.testing.assert_allclose(torques, tau1, rtol=1e-12)
     np.testing.assert_allclose(angles, np.delete(pitch, np.arange(4, 9)), rtol=1e-12)

@@ -33,3 +33,8 @@ pub(crate) struct End {
     /// The opposite change.
     pub out: Change,
 }
+
+/// Returns the name of a variable in a system.
+pub(crate) fn joined(component: &str, name: &str) -> String {
+    if component.is_empty() { name.to_owned() } else { format!("{component}.{name}") }
+}

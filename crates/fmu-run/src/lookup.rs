@@ -1,9 +1,8 @@
 //! Variables found by name, and checks whether a caller may set them.
 
-use crate::connector::{Connector, End};
+use crate::connector::{Connector, End, joined};
 use crate::description::{Description, Variable};
 use crate::error::{Error, request};
-use crate::system::joined;
 use fmi_abi::{BaseType, Causality, Variability};
 
 /// A variable of a component that was found by its name.

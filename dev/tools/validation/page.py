@@ -23,18 +23,20 @@ def page(found: Validation) -> str:
         loader=jinja2.FileSystemLoader(PROJECT / SOURCES), undefined=jinja2.StrictUndefined
     )
     description = read_description(PROJECT / TESTBED)
+    sections = [
+        ("outcome", "Outcome", outcome(found)),
+        ("experiments", "Experiments", experiments(found)),
+        ("runs", "Runs", runs(found)),
+        ("sensitivity", "Changes that the tolerances detect", sensitivity(found)),
+    ]
     return environment.get_template("page.html").render(
         style=read(PROJECT / SOURCES / "style.css"),
         title="Validation of the testbed’s FMU",
         lead=LEAD,
         version=html.escape(description.version),
         license=html.escape(description.license),
-        sections=[
-            ("outcome", "Outcome", outcome(found)),
-            ("experiments", "Experiments", experiments(found)),
-            ("runs", "Runs", runs(found)),
-            ("sensitivity", "Changes that the tolerances detect", sensitivity(found)),
-        ],
+        links=[(f"#{name}", title) for name, title, _ in sections],
+        sections=sections,
     )
 
 

@@ -52,12 +52,14 @@ pub(crate) fn apart<T, U>(
 ) -> Outcome {
     // An array does not begin inside of the other one if the distance is at least the size.
     let [begin, other] = [pointer.addr(), values.addr()];
-    let [size, written] = [length.saturating_mul(size_of::<T>()), count.saturating_mul(size_of::<U>())];
+    let [size, written] = [length.wrapping_mul(size_of::<T>()), count.wrapping_mul(size_of::<U>())];
     if other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
         return Ok(());
     }
     // Arrays that are larger than memory have another error.
-    if size == 0 || written == 0 || size.max(written) > isize::MAX as usize {
+    let fits =
+        |length: usize, size: usize| length.checked_mul(size).is_some_and(|all| all <= isize::MAX as usize);
+    if size == 0 || written == 0 || !fits(length, size_of::<T>()) || !fits(count, size_of::<U>()) {
         return Ok(());
     }
     reject(format!("the arrays {name} and {argument} overlap"))

@@ -1,7 +1,8 @@
 //! The content of a system: finds its variables by name, and checks its connections.
 
-use super::{Component, Definition, Exchange, Order, System, joined, nearest, order};
+use super::{Component, Definition, Exchange, Order, System, nearest, order};
 use crate::change::Change;
+use crate::connector::joined;
 use crate::connector::{End, Place};
 use crate::description::Variable;
 use crate::error::{Error, request};

@@ -2,10 +2,11 @@
 
 use super::STRUCTURE;
 use crate::connector::Place;
+use crate::connector::joined;
 use crate::error::{Error, request};
 use crate::start::StartValues;
 use crate::system::ssp::{Base, child, children, needed};
-use crate::system::{Definition, Order, System, joined};
+use crate::system::{Definition, Order, System};
 use fmi_abi::files::{Limits, read_xml};
 use fmi_abi::xml::{self, attribute};
 use fmi_abi::{Causality, Value, shown};

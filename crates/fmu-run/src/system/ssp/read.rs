@@ -3,8 +3,8 @@
 use super::FMU;
 use super::source::Base;
 use crate::change::Change;
+use crate::connector::joined;
 use crate::error::Error;
-use crate::system::joined;
 use crate::unit::Unit;
 use fmi_abi::xml::attribute;
 use fmi_abi::{boolean, shown};
