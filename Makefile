@@ -74,7 +74,7 @@ help:
 	@echo '                             and for FMI 3.0                        -> target/fmu/fmi3/prw_testbed.fmu'
 	@echo 'make demo-fmu                build both faster: without the page that runs the FMU, unless the existing FMU has it'
 	@echo 'make test                    run all checks and tests that need no browser and no other platform'
-	@echo 'make check                   check the changes since the last commit, in about a minute'
+	@echo 'make check                   check the changes since the last commit and what depends on them'
 	@echo 'make check-release           run every check and write a table        -> out/release-check.md'
 	@echo 'make test-long               run the tests that take too long for make test: templates, maintenance tools'
 	@echo 'make test-rust               check the Rust code: format, lints, tests, documentation'
@@ -124,7 +124,6 @@ fmu: need-rust $(if $(PROGRAMS),compile-tests)
 	@$(ADD_WEBASSEMBLY) || true
 	@$(BUILD_FMU)
 
-# Takes about a minute after a small change.
 check: $(VENV)/tests.stamp need-rust
 	@$(PY) dev/tools/changed.py
 
