@@ -70,11 +70,12 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 def find_part(page: Page, cursor: str = "ns-resize") -> tuple[float, float]:
     """Returns a position in the image at which the mouse cursor has this shape, and leaves the mouse there. The cursor is "ns-resize"
-    on a motor and "move" on the gripper. The search begins at the left, where motor 1 is in the view from the front."""
+    on a motor and "move" on the gripper. The search begins at the left, where motor 1 is in the view from the front, or near the middle,
+    where the gripper is, because each position takes a frame."""
     scene = page.locator(".live-scene")
     box = scene.bounding_box()
     assert box
-    for x in range(10, int(0.6 * box["width"]), 10):
+    for x in range(int(0.35 * box["width"]) if cursor == "move" else 10, int(0.6 * box["width"]), 10):
         for y in range(20, int(box["height"]), 20):
             page.mouse.move(box["x"] + x, box["y"] + y)
             if scene.evaluate("canvas => canvas.style.cursor") == cursor:
