@@ -1,6 +1,10 @@
 //! Compares the exact step with independent calculations: with eq. (11) instead of the decoupled equations, and with the
 //! matrix exponential instead of the propagator.
 
+#[path = "fmu/exponential.rs"]
+mod exponential;
+
+use exponential::exponential;
 use fmu_test_kit::Random;
 use nalgebra::SMatrix;
 use prw_testbed::pair::PitchRoll;
@@ -30,19 +34,6 @@ fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
         testbed.motors.set_theta(motor, theta[motor]);
         testbed.motors.set_rate(motor, rates[motor]);
     }
-}
-
-/// Returns the exponential of a matrix: the series of a fraction of it, squared repeatedly.
-fn exponential(matrix: SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
-    let largest = matrix.iter().fold(1.0, |largest: f64, x| largest.max(x.abs()));
-    let halvings = largest.log2().ceil() as i32 + 4;
-    let part = matrix * 0.5_f64.powi(halvings);
-    let (mut sum, mut term) = (SMatrix::identity(), SMatrix::identity());
-    for k in 1..16 {
-        term = term * part / f64::from(k);
-        sum += term;
-    }
-    (0..halvings).fold(sum, |power, _| power * power)
 }
 
 /// Returns the state x after time h with constant motor rates omega, by the matrix exponential for `[x, theta, omega]`.

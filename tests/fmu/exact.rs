@@ -3,6 +3,7 @@
 
 #![allow(non_snake_case, reason = "the paper's symbols")]
 
+use crate::exponential::exponential;
 use crate::{TABLE, vr};
 use fmu_export::{BaseType, Causality, Variable};
 use fmu_test_kit::{Either, Random};
@@ -72,19 +73,6 @@ pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     }
     (jacobian[(12, 0)], jacobian[(13, 1)]) = (1.0, 1.0);
     jacobian
-}
-
-/// Returns the exponential of a matrix: the series of a fraction of it, squared repeatedly.
-fn exponential(matrix: SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
-    let largest = matrix.iter().fold(1.0, |largest: f64, x| largest.max(x.abs()));
-    let halvings = largest.log2().ceil() as i32 + 4;
-    let part = matrix * 0.5_f64.powi(halvings);
-    let (mut sum, mut term) = (SMatrix::identity(), SMatrix::identity());
-    for k in 1..16 {
-        term = term * part / f64::from(k);
-        sum += term;
-    }
-    (0..halvings).fold(sum, |power, _| power * power)
 }
 
 /// Returns the state and the motor angles after time h, while the motors turn at constant rates.

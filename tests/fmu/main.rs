@@ -6,6 +6,7 @@
 mod co_simulation;
 mod derivatives;
 mod exact;
+mod exponential;
 mod fmikit;
 mod model_exchange;
 mod parameters;

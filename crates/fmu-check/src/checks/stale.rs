@@ -23,8 +23,8 @@ struct PointSnapshots {
     after_event: Vec<Pair>,
     /// Pair of the rule dynamics.event-mode.
     in_event: [Pair; 1],
-    /// Snapshots of the rule dynamics.read-order, each read after the states were set: to some states, to other states with variables
-    /// before derivatives, to the first states with variables before derivatives, and to the other states.
+    /// Snapshots of the rule dynamics.read-order. The states are set to A, B, A and B before them. In the middle two, variables are read
+    /// before derivatives, and in the others after them.
     orders: [Snapshot; 4],
     /// Snapshots with equal time, states and inputs, whose differences are the error of an iterative solver.
     repeated: [Snapshot; 3],
