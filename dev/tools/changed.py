@@ -29,6 +29,7 @@ TESTS = {
     "crates/fmu-run/*": ("tests/fmu_run",),
     "crates/fmu-check/*": ("tests/check/test_file_limits.py",),
     "dev/*.py": ("tests/scripts",),
+    "dev/benches/*.json": ("tests/scripts",),
     "docs/examples*": ("tests/examples",),
     "examples/*.py": ("tests/examples",),
     "python/prw/*.md": ("tests/prw/test_library.py", "tests/analysis/test_tutorial.py"),

@@ -90,7 +90,6 @@ def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
     assert done.stdout == "found    Pending is a status\nescaped  a number is hexadecimal\n1 of 2 faults found\n"
 
 
-@pytest.mark.long
 def test_docs_are_written(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "dev/benches", tmp_path / "dev/benches")
     run(sys.executable, "dev/tools", "docs", "--project", tmp_path)
