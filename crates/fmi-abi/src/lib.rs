@@ -27,6 +27,7 @@ pub mod stamp;
 mod standard;
 mod status;
 mod text;
+mod unit;
 mod value;
 #[cfg(feature = "write")]
 pub mod write;
@@ -42,6 +43,7 @@ pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
 pub use text::{SHOWN, is_c_identifier, is_plain_file_name, one_line, shown, shown_number, shown_to};
+pub use unit::{BASE_UNITS, BaseUnit, DisplayUnit, Unit};
 pub use value::{Value, boolean};
 
 /// Defines the items of an FMI version's module from its list of functions.

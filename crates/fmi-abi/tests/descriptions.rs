@@ -1,8 +1,8 @@
 //! Model descriptions that are unusual or wrong: what is read, and what is reported.
 #![cfg(feature = "description")]
 
-use fmi_abi::Causality;
 use fmi_abi::description::{Fault, ModelDescription};
+use fmi_abi::{BaseUnit, Causality, DisplayUnit, Unit};
 
 fn fmi2(offer: &str, variables: &str, rest: &str) -> ModelDescription {
     let text = format!(
@@ -38,7 +38,9 @@ fn blanks_around_numbers_and_booleans_do_not_count() {
     assert_eq!(found.faults, []);
     let (offer, x) = (found.co_simulation.unwrap(), &found.variables[0]);
     assert!(offer.saves_states && offer.can(&["canGetAndSetFMUstate"]));
-    assert_eq!(found.display_units["rad"], [("deg".to_owned(), 57.5, 2.0)]);
+    let deg = DisplayUnit { name: "deg".to_owned(), factor: 57.5, offset: 2.0 };
+    let rad = BaseUnit { exponents: [0, 0, 0, 0, 0, 0, 0, 1], ..BaseUnit::ONE };
+    assert_eq!(found.units["rad"], Unit { base: Some(rad), display_units: vec![deg] });
     assert_eq!(found.enumerations["E"], [("i".to_owned(), 3)]);
     assert_eq!(found.default_experiment, [None, Some(2.0), None]);
     assert_eq!((x.reference, x.min, x.max, x.nominal), (1, Some(-1.0), Some(9.0), 4.0));
@@ -54,7 +56,7 @@ fn attributes_that_cannot_be_read_are_reported() {
     let display =
         "<UnitDefinitions><Unit name='rad'><DisplayUnit name='deg' factor='57,3'/></Unit></UnitDefinitions>";
     let found = fmi2("", "", display);
-    assert!(found.display_units["rad"].is_empty(), "a display unit without its factor cannot be used");
+    assert!(found.units["rad"].display_units.is_empty(), "a display unit without its factor cannot be used");
     assert_eq!(faults(found), ["line 3: factor of DisplayUnit deg is \"57,3\", not a number"]);
     assert_eq!(
         faults(fmi2("needsExecutionTool='yes'", "", "")),

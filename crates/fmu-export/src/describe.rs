@@ -11,7 +11,7 @@ use crate::info::Info;
 use crate::model::Setup;
 use crate::stamp::{new_model, stamp};
 use crate::types::{Attributes, Type};
-use crate::units::{BaseUnit, Unit};
+use crate::units::Unit;
 use crate::variable::Variable;
 use fmi_abi::Interface;
 use fmi_abi::c_types::{c_char, c_void};
@@ -199,12 +199,11 @@ fn variable_type(json: &mut Json, of: &Type) {
 
 #[inline(never)]
 fn unit(json: &mut Json, of: &Unit) {
-    let BaseUnit { kg, m, s, A: ampere, K: kelvin, mol, cd, rad, factor, offset } = of.base;
     json.open("unit", '{');
     json.string("name", of.name);
-    json.words("exponents", [kg, m, s, ampere, kelvin, mol, cd, rad]);
-    json.number("factor", &factor);
-    json.number("offset", &offset);
+    json.words("exponents", of.base.exponents);
+    json.number("factor", &of.base.factor);
+    json.number("offset", &of.base.offset);
     if let Some(display) = of.display {
         json.open("display", '{');
         json.string("name", display.name);

@@ -1,6 +1,7 @@
 //! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0), and constants for the most frequent units of mechanics, for
 //! use in a [`Type`](crate::Type). The display unit of angles is the degree.
 
+pub use fmi_abi::{BaseUnit, DisplayUnit};
 use std::f64::consts::PI;
 
 /// A unit: exponents of the SI base units and of rad, with factor and offset.
@@ -19,56 +20,18 @@ pub struct Unit {
     /// Definition in base units.
     pub base: BaseUnit,
     /// Unit in which tools show the values.
-    pub display: Option<DisplayUnit>,
+    pub display: Option<DisplayUnit<&'static str>>,
 }
 
-/// A unit in terms of base units: their exponents, and the conversion of a value to base units, `factor * value +
-/// offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(non_snake_case, reason = "the symbols of the units")]
-pub struct BaseUnit {
-    /// Exponent of the kilogram.
-    pub kg: i32,
-    /// Exponent of the metre.
-    pub m: i32,
-    /// Exponent of the second.
-    pub s: i32,
-    /// Exponent of the ampere.
-    pub A: i32,
-    /// Exponent of the kelvin.
-    pub K: i32,
-    /// Exponent of the mole.
-    pub mol: i32,
-    /// Exponent of the candela.
-    pub cd: i32,
-    /// Exponent of the radian.
-    pub rad: i32,
-    /// Factor by which a value in this unit is multiplied.
-    pub factor: f64,
-    /// Offset that is added after the multiplication.
-    pub offset: f64,
-}
-
-/// A display unit: the displayed value is `factor * value + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DisplayUnit {
-    /// Name, for example `deg`.
-    pub name: &'static str,
-    /// Factor by which the value is multiplied.
-    pub factor: f64,
-    /// Offset that is added after the multiplication.
-    pub offset: f64,
-}
-
-/// Defines a method for the exponent of each base unit.
+/// Defines a method for the exponent of each base unit, which is at an index of `fmi_abi::BASE_UNITS`.
 macro_rules! exponents {
-    ($($unit:ident)+) => {
+    ($($index:literal $unit:ident)+) => {
         $(
             #[doc = concat!("Sets the exponent of ", stringify!($unit), ".")]
             #[allow(non_snake_case, reason = "the symbols of the units")]
             #[must_use]
             pub const fn $unit(mut self, exponent: i32) -> Self {
-                self.base.$unit = exponent;
+                self.base.exponents[$index] = exponent;
                 self
             }
         )+
@@ -78,12 +41,10 @@ macro_rules! exponents {
 impl Unit {
     /// Creates a dimensionless unit of this name.
     pub const fn new(name: &'static str) -> Self {
-        let base =
-            BaseUnit { kg: 0, m: 0, s: 0, A: 0, K: 0, mol: 0, cd: 0, rad: 0, factor: 1.0, offset: 0.0 };
-        Self { name, base, display: None }
+        Self { name, base: BaseUnit::ONE, display: None }
     }
 
-    exponents!(kg m s A K mol cd rad);
+    exponents!(0 kg 1 m 2 s 3 A 4 K 5 mol 6 cd 7 rad);
 
     /// Sets the factor of the conversion to base units.
     #[must_use]

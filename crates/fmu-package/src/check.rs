@@ -7,7 +7,7 @@ use crate::model::LoadedModel;
 use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmi_abi::{
-    BaseType, Causality, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
+    BaseType, BaseUnit, Causality, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
 };
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -224,9 +224,8 @@ pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
 }
 
 fn check_unit(unit: &Unit) -> Result<()> {
-    let display =
-        unit.display.as_ref().map(|(name, factor, offset)| ("display unit", name, *factor, *offset));
-    let own = ("unit", &unit.name, unit.factor, unit.offset);
+    let display = unit.display.as_ref().map(|of| ("display unit", &of.name, of.factor, of.offset));
+    let own = ("unit", &unit.name, unit.base.factor, unit.base.offset);
     for (kind, name, factor, offset) in [own].into_iter().chain(display) {
         check_name(format_args!("the name of its {kind}"), name)?;
         ensure!(
@@ -275,20 +274,24 @@ fn check_derivatives(table: &Table) -> Result<()> {
     Ok(())
 }
 
+/// Indices in `fmi_abi::BASE_UNITS`.
+const SECOND: usize = 2;
+const RADIAN: usize = 7;
+
 /// Rejects a derivative whose unit is not the unit of its state per second. A variable without a unit is not checked, and the radian
 /// may be left out.
 fn check_units(table: &Table) -> Result<()> {
     for &(state, rate) in &table.states {
         let of = |index: u32| table.variable(index).and_then(|variable| variable.variable_type.unit());
         let (Some(unit), Some(unit_of_rate)) = (of(state), of(rate)) else { continue };
-        let has_unit = |unit: &Unit| unit.exponents.iter().any(|exponent| *exponent != 0);
-        if !has_unit(unit_of_rate) || !has_unit(unit) && unit.factor == 1.0 && unit.name != "1" {
+        let [of_state, of_rate] = [unit.base, unit_of_rate.base];
+        let has_unit = |unit: BaseUnit| unit.exponents.iter().any(|exponent| *exponent != 0);
+        if !has_unit(of_rate) || !has_unit(of_state) && of_state.factor == 1.0 && unit.name != "1" {
             continue;
         }
-        let mut expected = unit.exponents.clone();
-        expected[2] -= 1;
-        let [expected, found] =
-            [&expected, &unit_of_rate.exponents].map(|exponents| with_exponents(exponents));
+        let mut per_second = of_state;
+        per_second.exponents[SECOND] -= 1;
+        let [expected, found] = [per_second, of_rate].map(without_radian);
         let [name, name_of_rate] = [state, rate].map(|index| table.name(index));
         ensure!(
             expected == found,
@@ -297,28 +300,22 @@ fn check_units(table: &Table) -> Result<()> {
             unit.name
         );
         ensure!(
-            (unit.factor - unit_of_rate.factor).abs() <= 1e-9 * unit.factor.abs(),
+            (of_state.factor - of_rate.factor).abs() <= 1e-9 * of_state.factor.abs(),
             "{name_of_rate} is in {}, whose factor is {}, but {name} is in {}, whose factor is {}; importers integrate the numbers, so \
              both factors must be equal",
             unit_of_rate.name,
-            unit_of_rate.factor,
+            of_rate.factor,
             unit.name,
-            unit.factor
+            of_state.factor
         );
     }
     Ok(())
 }
 
-/// Returns exponents as they are written in a unit, without the radian: `kg.m2.s-2`.
-fn with_exponents(exponents: &[i64]) -> String {
-    let names = ["kg", "m", "s", "A", "K", "mol", "cd"];
-    let factors = names.iter().zip(exponents).filter(|(_, exponent)| **exponent != 0);
-    let factors = factors.map(|(name, exponent)| match exponent {
-        1 => (*name).to_owned(),
-        _ => format!("{name}{exponent}"),
-    });
-    let text = factors.collect::<Vec<_>>().join(".");
-    if text.is_empty() { "none".to_owned() } else { text }
+/// Returns the exponents of a unit as tools write them, without the radian.
+fn without_radian(mut unit: BaseUnit) -> String {
+    unit.exponents[RADIAN] = 0;
+    Some(unit.symbol()).filter(|symbol| !symbol.is_empty()).unwrap_or("none".to_owned())
 }
 
 /// Returns the start values of a new model, after checking that they fit their types and are the same for each interface type. Also checks

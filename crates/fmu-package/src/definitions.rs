@@ -24,20 +24,17 @@ pub(crate) fn unit_definitions(types: &[&Type]) -> Result<Option<Element>> {
 }
 
 fn unit_definition(unit: &Unit) -> Element {
-    let names = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
-    let exponents = names.into_iter().zip(&unit.exponents).filter(|(_, exponent)| **exponent != 0);
-    let base = exponents.fold(Element::new("BaseUnit"), |base, (name, exponent)| base.with(name, exponent));
-    let factor = (unit.factor != 1.0).then_some(unit.factor);
-    let base = base.with_some("factor", factor).with_some("offset", not_zero(unit.offset));
-    let display = unit.display.as_ref().map(|(name, factor, offset)| {
-        let unit = Element::new("DisplayUnit").with("name", name);
-        unit.with("factor", factor).with_some("offset", not_zero(*offset))
+    let display = unit.display.as_ref().map(|of| {
+        let offset = (of.offset != 0.0).then_some(of.offset);
+        Element::new("DisplayUnit")
+            .with("name", &of.name)
+            .with("factor", of.factor)
+            .with_some("offset", offset)
     });
-    Element::new("Unit").with("name", &unit.name).containing([base]).containing(display)
-}
-
-fn not_zero(offset: f64) -> Option<f64> {
-    (offset != 0.0).then_some(offset)
+    Element::new("Unit")
+        .with("name", &unit.name)
+        .containing([unit.base.element("BaseUnit")])
+        .containing(display)
 }
 
 /// Returns the element with the types that have a name, in the order of their first use; `None` if there are none.
@@ -83,7 +80,7 @@ pub(crate) fn with_attributes(element: Element, definition: &Type) -> Element {
     let element = element
         .with_some("quantity", filled(quantity))
         .with("unit", &unit.name)
-        .with_some("displayUnit", unit.display.as_ref().map(|(name, ..)| name));
+        .with_some("displayUnit", unit.display.as_ref().map(|of| &of.name));
     with_range(element, definition).with_some("nominal", *nominal)
 }
 

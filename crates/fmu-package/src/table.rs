@@ -1,7 +1,7 @@
 //! Reads the description of a model that its library returns: general information, the variables and their start values.
 
 use anyhow::{Context, Result, anyhow, ensure};
-use fmi_abi::{BaseType, Causality, Initial, Interface, Value, Variability};
+use fmi_abi::{BaseType, BaseUnit, Causality, DisplayUnit, Initial, Interface, Value, Variability};
 use serde_json::Value as Json;
 use std::str::FromStr;
 
@@ -109,12 +109,8 @@ pub(crate) struct Item {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Unit {
     pub name: String,
-    /// The exponents of kg, m, s, A, K, mol, cd and rad.
-    pub exponents: Vec<i64>,
-    pub factor: f64,
-    pub offset: f64,
-    /// Name, factor and offset of the display unit.
-    pub display: Option<(String, f64, f64)>,
+    pub base: BaseUnit,
+    pub display: Option<DisplayUnit>,
 }
 
 /// The start values of a new model.
@@ -327,12 +323,22 @@ fn variable_type(json: &Json) -> Result<Type> {
 }
 
 fn unit(json: &Json) -> Result<Unit> {
-    let display = |json: &Json| Ok((text(json, "name")?, number(json, "factor")?, number(json, "offset")?));
+    let display = |json: &Json| {
+        Ok(DisplayUnit {
+            name: text(json, "name")?,
+            factor: number(json, "factor")?,
+            offset: number(json, "offset")?,
+        })
+    };
+    let exponent = |json: &Json| json.as_i64().and_then(|exponent| exponent.try_into().ok());
+    let exponents = list(json, "exponents", |json| exponent(json).with_context(lacks("exponents")))?;
     Ok(Unit {
         name: text(json, "name")?,
-        exponents: list(json, "exponents", |json| json.as_i64().with_context(lacks("exponents")))?,
-        factor: number(json, "factor")?,
-        offset: number(json, "offset")?,
+        base: BaseUnit {
+            exponents: exponents.try_into().ok().with_context(lacks("exponents"))?,
+            factor: number(json, "factor")?,
+            offset: number(json, "offset")?,
+        },
         display: some(json, "display", display)?,
     })
 }

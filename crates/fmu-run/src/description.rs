@@ -3,11 +3,9 @@
 use crate::arrays::{Array, Arrays};
 use crate::change::Change;
 use crate::index::Index;
-use crate::unit::Unit;
 use fmi_abi::client::VariableNames;
 use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
-use fmi_abi::{BaseType, Causality, Value, Variability};
-use std::collections::HashMap;
+use fmi_abi::{BaseType, BaseUnit, Causality, Value, Variability};
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -109,8 +107,6 @@ pub struct Description {
     /// Arrays, whose elements are variables.
     pub(crate) arrays: Arc<Arrays>,
     indices: Index,
-    /// Definitions of the units by name, so that each text is read once and not for each variable.
-    definitions: HashMap<String, Unit>,
     /// For each variable of the file, the range of its entries in `variables`: one entry, or one for each element of an array. The
     /// range is empty for a clock, a clocked variable, or an array whose size is unknown or too large.
     spans: Vec<Range<usize>>,
@@ -201,11 +197,6 @@ impl Description {
             states,
             event_indicators,
             arrays: Arc::new(arrays),
-            definitions: written
-                .units
-                .iter()
-                .filter_map(|(name, of)| Some((name.clone(), Unit::of(of)?)))
-                .collect(),
             indices: Index::of(variables.iter().map(|of| of.name.as_str())),
             variables,
             spans,
@@ -276,7 +267,7 @@ impl Description {
         check_kinds(output, input)?;
         if let (Some(one), Some(other)) = (&output.unit, &input.unit) {
             match (self.unit_of(output), to.unit_of(input)) {
-                (Some(of_one), Some(of_other)) if of_one == of_other => {}
+                (Some(of_one), Some(of_other)) if of_one.equals(&of_other) => {}
                 (Some(of_one), Some(of_other)) if one == other => {
                     return Err(format!(
                         "both are in {one}, but the output's is {of_one} and the input's {of_other}"
@@ -314,10 +305,11 @@ impl Description {
         }
     }
 
-    /// Returns the definition of the unit of a variable, if there is one.
-    pub(crate) fn unit_of(&self, variable: &Variable) -> Option<Unit> {
-        let unit = self.definitions.get(variable.unit.as_deref()?)?;
-        Some(if variable.is_relative { unit.of_difference() } else { *unit })
+    /// Returns the definition of the unit of a variable, if there is one. An empty `BaseUnit` defines nothing: some tools write one for
+    /// each unit that they do not know.
+    pub(crate) fn unit_of(&self, variable: &Variable) -> Option<BaseUnit> {
+        let unit = self.units.get(variable.unit.as_deref()?)?.base.filter(|base| *base != BaseUnit::ONE)?;
+        Some(if variable.is_relative { unit.of_difference() } else { unit })
     }
 }
 
@@ -519,4 +511,52 @@ fn add_aliases(
 /// Returns a unit that is given: some tools write `unit=""` for a variable without a unit.
 fn given(unit: &Option<Arc<str>>) -> Option<Arc<str>> {
     unit.clone().filter(|unit| !unit.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Description;
+
+    fn with_unit(unit: &str, definition: &str, attributes: &str) -> Description {
+        let text = format!(
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"M\" guid=\"m\"><CoSimulation modelIdentifier=\"m\"/>\
+             <UnitDefinitions><Unit name=\"{unit}\">{definition}</Unit></UnitDefinitions><ModelVariables>\
+             <ScalarVariable name=\"v\" valueReference=\"1\" causality=\"output\"><Real unit=\"{unit}\" {attributes}/></ScalarVariable>\
+             </ModelVariables></fmiModelDescription>"
+        );
+        Description::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn units_are_compared_by_definition() {
+        let torque = r#"<BaseUnit kg="1" m="2" s="-2"/>"#;
+        let (degree, short) = (
+            r#"<BaseUnit rad="1" factor="0.017453292519943295"/>"#,
+            r#"<BaseUnit rad="1" factor="0.01745329"/>"#,
+        );
+        let celsius = r#"<BaseUnit K="1" offset="273.15"/>"#;
+        for (one, other, why) in [
+            (("Nm", torque, ""), ("N.m", torque, ""), Ok(())),
+            (("deg", degree, ""), ("deg", short, ""), Ok(())),
+            (("deg", "", ""), ("deg", degree, ""), Ok(())),
+            (("degC", celsius, r#"relativeQuantity="1""#), ("K", r#"<BaseUnit K="1"/>"#, ""), Ok(())),
+            (
+                ("deg", degree, ""),
+                ("deg", r#"<BaseUnit rad="1"/>"#, ""),
+                Err("both are in deg, but the output's is 0.017453292519943295 rad and the input's 1 rad"),
+            ),
+            (
+                ("u", celsius, ""),
+                ("u", torque, ""),
+                Err("both are in u, but the output's is 1 K + 273.15 and the input's 1 kg.m2.s-2"),
+            ),
+            (("Nm", "", ""), ("N.m", torque, ""), Err("the output is in Nm, the input in N.m")),
+            (("Nm", torque, ""), ("deg", degree, ""), Err("the output is in Nm, the input in deg")),
+        ] {
+            let [one, other] =
+                [one, other].map(|(unit, definition, attributes)| with_unit(unit, definition, attributes));
+            let found = one.connects(&one.variables[0], &other, &other.variables[0]);
+            assert_eq!(found, why.map_err(str::to_owned));
+        }
+    }
 }

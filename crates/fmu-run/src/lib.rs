@@ -29,7 +29,6 @@ mod start;
 mod system;
 mod system_instance;
 mod threads;
-mod unit;
 mod values;
 
 pub use batch::{Batch, Column, Finished, Measure, Occurrence, Planned, Runs, Size, Trajectory, Watch};
@@ -39,7 +38,9 @@ pub use error::Error;
 pub use fmi_abi::client::Message;
 pub use fmi_abi::client::{Continuous, Event};
 pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
-pub use fmi_abi::{BaseType, Causality, Interface, Standard, Status, Value, Variability};
+pub use fmi_abi::{
+    BaseType, BaseUnit, Causality, DisplayUnit, Interface, Standard, Status, Unit, Value, Variability,
+};
 pub use instance::Tolerance;
 pub use instances::{Instances, Mask, Setup, States};
 pub use messages::Logged;

@@ -80,12 +80,11 @@ impl Found<'_> {
         if **own == *unit {
             return Ok((1.0, 0.0));
         }
-        let others = self.description.display_units.get(&**own).map_or(&[][..], Vec::as_slice);
-        if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
-            return Ok((*factor, if self.variable.is_relative { 0.0 } else { *offset }));
+        let others = self.description.units.get(&**own).map_or(&[][..], |own| &own.display_units);
+        if let Some(of) = others.iter().find(|of| of.name == unit) {
+            return Ok((of.factor, if self.variable.is_relative { 0.0 } else { of.offset }));
         }
-        let known: Vec<_> =
-            std::iter::once(&**own).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
+        let known: Vec<_> = std::iter::once(&**own).chain(others.iter().map(|of| &*of.name)).collect();
         request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
     }
 }

@@ -9,7 +9,9 @@ mod signals;
 mod start;
 
 use buffers::{Numbers, Output};
-use fmu_run::{Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, Size, System, Watch};
+use fmu_run::{
+    Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, Size, System, Unit, Watch,
+};
 use log::Log;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
@@ -48,7 +50,9 @@ impl Model {
 
 /// FMI version, model name, token, pairs of a state and its derivative, names of floating-point outputs, whether each interface
 /// type has directional derivatives, and attributes of units.
-type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, BTreeMap<String, Pairs>);
+type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, Units);
+/// Attributes of the base unit, by the name of the unit.
+type Units = BTreeMap<String, Vec<(&'static str, String)>>;
 type Pairs = Vec<(String, String)>;
 /// Pairs of an output and a connected input, by stage.
 type Stages = Vec<Pairs>;
@@ -221,6 +225,8 @@ impl Loaded {
         let offers = [("co-simulation", &about.co_simulation), ("model-exchange", &about.model_exchange)];
         let offers =
             offers.into_iter().filter_map(|(name, of)| Some((name, of.as_ref()?.directional_derivatives)));
+        let attributes = |unit: &Unit| unit.base.map_or(Vec::new(), |base| base.attributes());
+        let units = about.units.iter().map(|(name, unit)| (name.clone(), attributes(unit)));
         Ok((
             version.to_owned(),
             about.model_name.clone(),
@@ -228,7 +234,7 @@ impl Loaded {
             derivatives.collect(),
             outputs.map(|of| of.name.clone()).collect(),
             offers.collect(),
-            about.units.clone(),
+            units.collect(),
         ))
     }
 

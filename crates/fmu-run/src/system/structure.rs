@@ -5,6 +5,7 @@ use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
 use crate::start::{exact, number_of};
 use crate::system::definition::check_direction;
+use fmi_abi::BaseUnit;
 use fmi_abi::write::{Element, unzip};
 use fmi_abi::{Causality, Value};
 use std::collections::BTreeMap;
@@ -59,8 +60,8 @@ pub struct CheckedStructure<'a> {
     pub(super) structure: &'a SystemStructure<'a>,
     /// The FMUs of the components: their bytes and model descriptions.
     fmus: Vec<(Vec<u8>, Description)>,
-    /// Units by name, each with the exponents of SI base units, factor and offset.
-    pub(super) units: BTreeMap<String, Vec<(String, String)>>,
+    /// Definitions of the units of all FMUs by name.
+    pub(super) units: BTreeMap<String, Option<BaseUnit>>,
 }
 
 impl<'a> SystemStructure<'a> {
@@ -122,8 +123,8 @@ impl CheckedStructure<'_> {
         let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?);
         let description = Description::parse(&text.map_err(|error| error.to_string())?)?;
         for (name, unit) in &description.units {
-            let before = self.units.entry(name.clone()).or_insert_with(|| unit.clone());
-            if before != unit {
+            let before = self.units.entry(name.clone()).or_insert(unit.base);
+            if *before != unit.base {
                 return Err(format!("its unit {name} differs from the unit of this name in another FMU"));
             }
         }

@@ -5,9 +5,8 @@ use super::source::Base;
 use crate::change::Change;
 use crate::connector::joined;
 use crate::error::Error;
-use crate::unit::Unit;
 use fmi_abi::xml::attribute;
-use fmi_abi::{boolean, shown};
+use fmi_abi::{BaseUnit, boolean, shown};
 use roxmltree::Node;
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -68,7 +67,7 @@ pub(super) struct Binding<'r> {
 }
 
 /// Definitions of units by name.
-pub(super) type Units = HashMap<String, Unit>;
+pub(super) type Units = HashMap<String, BaseUnit>;
 
 /// A connector as declared in the file.
 pub(super) struct Declared<'r> {
@@ -353,18 +352,14 @@ impl Transformation {
     }
 }
 
-/// Reads the definitions of units in an SSD or SSV file. A unit without a definition is left out.
+/// Reads the definitions of units in an SSD or SSV file. A unit without a definition is left out; an empty `BaseUnit` defines nothing.
 pub(super) fn units(root: Node) -> Result<Units, String> {
     let mut units = Units::new();
     for node in children(root, "Units") {
         let Some(base) = child(node, "BaseUnit") else { continue };
-        let attributes: Vec<_> =
-            base.attributes().map(|of| (of.name().to_owned(), of.value().to_owned())).collect();
-        let name = needed(node, "name")?;
-        let unreadable =
-            || format!("the definition of the unit {} has a value that is not a number", shown(name));
-        if !attributes.is_empty() {
-            units.insert(name.to_owned(), Unit::of(&attributes).ok_or_else(unreadable)?);
+        let unit = BaseUnit::read(base)?;
+        if unit != BaseUnit::ONE {
+            units.insert(needed(node, "name")?.to_owned(), unit);
         }
     }
     Ok(units)

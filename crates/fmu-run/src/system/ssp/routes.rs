@@ -7,8 +7,7 @@ use crate::connector::{self, Connector, End};
 use crate::error::{Error, request};
 use crate::lookup::Found;
 use crate::system::Definition;
-use crate::unit::Unit;
-use fmi_abi::shown;
+use fmi_abi::{BaseUnit, shown};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -27,7 +26,7 @@ pub(super) struct Link<'r> {
 #[derive(Clone)]
 pub(super) struct NamedUnit {
     pub name: Arc<str>,
-    pub definition: Option<Unit>,
+    pub definition: Option<BaseUnit>,
 }
 
 /// The way of a value to the end of a connection.
@@ -50,9 +49,14 @@ impl NamedUnit {
     /// Fails if the units measure different quantities.
     pub fn conversion_to(&self, other: &Self) -> Result<Option<Change>, String> {
         match (self.definition, other.definition) {
-            (Some(one), Some(of_other)) => one.conversion_to(of_other).map(Some).ok_or_else(|| {
-                format!("the output is in {}, the input in {}", shown(&self.name), shown(&other.name))
-            }),
+            (Some(one), Some(of_other)) => match one.conversion_to(&of_other) {
+                Some((factor, offset)) => Ok(Some(Change::linear(factor, offset))),
+                None => Err(format!(
+                    "the output is in {}, the input in {}",
+                    shown(&self.name),
+                    shown(&other.name)
+                )),
+            },
             _ => Ok((self.name == other.name).then(Change::default)),
         }
     }

@@ -5,6 +5,7 @@ use crate::error::{Error, request};
 use crate::files::STRUCTURE;
 use crate::lookup::Found;
 use crate::system::structure::{CheckedStructure, SystemStructure, document, file_name, split};
+use fmi_abi::BaseUnit;
 use fmi_abi::write::{Element, write_atomically, zip};
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
@@ -132,8 +133,7 @@ impl CheckedStructure<'_> {
     }
 
     fn unit(&self, name: &str) -> Option<Element> {
-        let attributes = self.units.get(name)?.clone();
-        let base = Element { attributes, ..Element::new("ssc:BaseUnit") };
+        let base = self.units.get(name)?.unwrap_or(BaseUnit::ONE).element("ssc:BaseUnit");
         Some(Element::new("ssc:Unit").with("name", name).containing([base]))
     }
 

@@ -1,0 +1,81 @@
+//! Reads the model structure (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+
+use super::variables::Positions;
+use super::{child, elements};
+use crate::description::faults::{Fault, Faults};
+use crate::description::{ModelDescription, Unknown};
+use crate::{DependencyKind, Standard};
+use roxmltree::Node;
+use std::collections::{HashMap, HashSet};
+
+impl ModelDescription {
+    /// Reads the model structure, which refers to variables by position in FMI 2.0, counted from 1, and by value
+    /// reference in FMI 3.0.
+    pub(super) fn structure(&mut self, root: Node, positions: &Positions, faults: &Faults) {
+        let by_reference: HashMap<u32, usize> =
+            self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
+        let standard = self.standard;
+        let find = |number: u32| {
+            let found = match standard {
+                Standard::Fmi2 => positions.find(number),
+                Standard::Fmi3 => by_reference.get(&number).copied().map(Some),
+            };
+            if found.is_none() {
+                let why = || format!("ModelStructure refers to {number}, which does not exist");
+                faults.add(Fault::Structure, why);
+            }
+            found.flatten()
+        };
+        let attribute = if standard == Standard::Fmi2 { "index" } else { "valueReference" };
+        let list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
+            let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
+            // Only the first entry of a variable counts.
+            let mut known = HashSet::new();
+            let new = |node| unknown(node, attribute, &find, faults);
+            let mut new = |node| new(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
+            match standard {
+                Standard::Fmi2 => elements(structure, group).filter_map(&mut new).collect(),
+                Standard::Fmi3 => {
+                    let nodes = structure.children().filter(|node| node.has_tag_name(of_fmi3));
+                    nodes.filter_map(&mut new).collect()
+                }
+            }
+        };
+        self.outputs = list("Outputs", "Output");
+        self.derivatives = list("Derivatives", "ContinuousStateDerivative");
+        self.initial_unknowns = list("InitialUnknowns", "InitialUnknown");
+        let indicators = list("", "EventIndicator");
+        self.event_indicators = match standard {
+            Standard::Fmi2 if root.has_attribute("numberOfEventIndicators") => {
+                faults.read(root, "numberOfEventIndicators")
+            }
+            Standard::Fmi2 => Some(0),
+            Standard::Fmi3 => indicators.iter().try_fold(0_usize, |count, unknown| {
+                count.checked_add(self.variables[unknown.variable].size?)
+            }),
+        };
+    }
+}
+
+/// Reads an unknown. `find` returns the index of a variable, or `None` if it does not exist or cannot be read. If one of the dependencies
+/// cannot be read, the unknown may depend on everything, as if the attribute were missing.
+fn unknown(
+    node: Node,
+    attribute: &str,
+    find: &impl Fn(u32) -> Option<usize>,
+    faults: &Faults,
+) -> Option<Unknown> {
+    let kind = node.tag_name().name();
+    if node.attribute(attribute).is_none() {
+        faults.add(Fault::Structure, || format!("ModelStructure has an {kind} without {attribute}"));
+    }
+    let variable = find(faults.read(node, attribute)?)?;
+    let dependencies: Option<Vec<u32>> = faults.read_list(node, "dependencies");
+    let dependencies =
+        dependencies.and_then(|list| list.into_iter().map(find).collect::<Option<Vec<usize>>>());
+    let mut kinds: Vec<DependencyKind> = faults.read_list(node, "dependenciesKind").unwrap_or_default();
+    if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
+        kinds.clear();
+    }
+    Some(Unknown { variable, dependencies, kinds })
+}
