@@ -108,22 +108,3 @@ pub enum FailOn {
 
 /// Names of the interface types that an FMU may have.
 pub const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
-
-#[cfg(test)]
-mod tests {
-    use super::Options;
-    use clap::Args as _;
-
-    #[test]
-    fn the_readme_states_the_defaults() {
-        let readme = include_str!("../README.md");
-        for option in Options::augment_args(clap::Command::new("fmu-check")).get_arguments() {
-            let name = option.get_long().expect("a long name");
-            assert!(readme.contains(&format!("| `--{name}")), "--{name}");
-            for default in option.get_default_values().iter().filter(|_| option.get_action().takes_values()) {
-                let row = format!("| `--{name} {}` |", default.to_string_lossy());
-                assert!(readme.contains(&row), "{row}");
-            }
-        }
-    }
-}
