@@ -14,7 +14,6 @@ use fmu_run::Standard;
 use fmu_test_kit::Random;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 use tempfile::TempDir;
 
 /// Limits of the address space in which all files are read, in MB. The process itself needs about 20 MB.
@@ -224,50 +223,4 @@ fn mutations() -> usize {
 #[test]
 fn mutations_of_malformed_files_are_errors() {
     run_limited("read_mutations", 256, mutations());
-}
-
-/// Returns the mean time that opening a system takes over all orders of data exchange, s.
-fn seconds(directory: &Path, system: &[u8]) -> f64 {
-    let begin = Instant::now();
-    harness::file_of_system(directory, "SystemStructure.ssd", system);
-    begin.elapsed().as_secs_f64() / harness::ORDERS.len() as f64
-}
-
-/// Repeats the tests, measures how long systems with many connections take, and writes the results to the page about robustness.
-#[test]
-#[ignore = "writes a page; run it with --profile bench, and READERS_MUTATIONS=2500"]
-fn write_figures() {
-    for megabytes in LIMITS {
-        run_limited("read_all", megabytes, 0);
-    }
-    run_limited("read_mutations", 256, mutations());
-    let outer = TempDir::new().unwrap();
-    let system = system(outer.path());
-    let times = [10_000, 100_000].map(|count| {
-        [corpus::chain(count, false), corpus::chain(count, true), corpus::unrelated(count)]
-            .map(|text| seconds(&system, &text))
-    });
-    let kinds = [corpus::descriptions(), corpus::systems(), corpus::parameters(), corpus::archives()];
-    let [descriptions, systems, parameters, archives] = kinds.map(|files| files.len());
-    let [least, .., most] = LIMITS;
-    let row = |count: &str, [chain, circle, unrelated]: [f64; 3]| {
-        format!(
-            "| a system of {count} connections in a chain, in a circle, and between unknown connectors | {chain:.2} s, {circle:.2} s, {unrelated:.2} s |\n"
-        )
-    };
-    let table = format!(
-        "| test | result |\n|---|---|\n\
-        | {descriptions} model descriptions, {systems} systems, {parameters} parameter sets and {archives} archives that are malformed, \
-        in {least} to {most} MB of memory | read, or an error of one line; no file outside |\n\
-        | {} mutations of them in 256 MB | the same |\n{}{}",
-        4 * mutations(),
-        row("10,000", times[0]),
-        row("100,000", times[1]),
-    );
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/robustness.md");
-    let text = std::fs::read_to_string(&page).unwrap();
-    let (before, rest) = text.split_once("<!-- readers -->\n").unwrap();
-    let (_, after) = rest.split_once("<!-- end of readers -->\n").unwrap();
-    std::fs::write(page, format!("{before}<!-- readers -->\n{table}<!-- end of readers -->\n{after}"))
-        .unwrap();
 }
