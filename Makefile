@@ -257,7 +257,6 @@ test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
 importer-fmus: closed-loop-fmus
 	@$(BUILD_FMU) --tunable --out target/fmu/tunable
 
-# `python dev/tools compatibility` writes the results into docs/compatibility.md.
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 

@@ -6,7 +6,7 @@ from pathlib import Path
 sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from prw.cli import run  # noqa: E402
-from tools import compatibility, documentation, examples, figures, validation  # noqa: E402
+from tools import documentation, examples, figures, validation  # noqa: E402
 from tools.validation import closed_loop  # noqa: E402
 
 COMMANDS = {
@@ -15,6 +15,5 @@ COMMANDS = {
     "figures": figures,
     "validation": validation,
     "closed-loop": closed_loop,
-    "compatibility": compatibility,
 }
 sys.exit(run("tools", "Tools of this repository.", COMMANDS, None))

@@ -17,7 +17,7 @@ from benches import instructions
 from built import ROOT, built
 
 from prw.cli import run as run_command
-from tools import changed, compatibility, figures
+from tools import changed, figures
 from tools.documentation import performance
 from tools.figures import animation, plots, screencast
 
@@ -115,22 +115,6 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
     )
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
     assert len(written) == 5 and all((ROOT / path).is_file() for path in written)
-
-
-@pytest.mark.long
-def test_compatibility_writes_only_its_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for path in (compatibility.RESULTS, compatibility.PAGE.parent):
-        path.mkdir(parents=True)
-    before = (ROOT / compatibility.PAGE).read_text(encoding="utf-8")
-    compatibility.PAGE.write_text(before, encoding="utf-8")
-    row = json.dumps(dict.fromkeys(compatibility.HEADS, "x"))
-    (compatibility.RESULTS / "one.json").write_text(row, encoding="utf-8")
-    assert run_command("tools", "", {"compatibility": compatibility}, ["compatibility"]) == 0
-    after = compatibility.PAGE.read_text(encoding="utf-8")
-    table = re.compile(rf"(?<=^## {compatibility.HEADING}\n).*?(?=^## )", re.DOTALL | re.MULTILINE)
-    assert table.findall(after)[0].count("\n|") == 3 and "| x | x | x | x | x | x |" in after
-    assert table.sub("", after) == table.sub("", before)
 
 
 def test_a_change_is_checked_where_it_is() -> None:
