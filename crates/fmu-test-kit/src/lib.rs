@@ -6,7 +6,7 @@
 //! * [`c_models`] compiles and packs test FMUs that are written in C.
 //! * [`c_programs`] compiles and runs C programs that load FMUs.
 //! * [`fault_injection`] is a fault-injecting importer, which makes any calls in any order.
-//! * [`models`] is the shelf of test models in Rust; the README of this crate lists what each is for.
+//! * [`models`] is the shelf of test models in Rust; each begins with a comment on what it is for.
 //! * [`realtime`] checks that code may run in a control loop.
 //! * [`checks`] contains checks that every FMU must pass; [`history`] and [`costs`] contain checks of instances that have
 //!   already run for a while.

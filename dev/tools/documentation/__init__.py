@@ -1,4 +1,4 @@
-"""Writes docs/performance.md from the results of `make bench` and `make instructions`."""
+"""Writes docs/performance.md from the results of `make bench`."""
 
 from __future__ import annotations
 

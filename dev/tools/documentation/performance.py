@@ -1,4 +1,4 @@
-"""Writes docs/performance.md from the results of `make bench` and `make instructions`."""
+"""Writes docs/performance.md from the results of `make bench`."""
 
 from __future__ import annotations
 
@@ -10,26 +10,24 @@ from typing import Any
 from tools.documentation.sources import read
 
 PAGE = Path("docs/performance.md")
-RATIOS, INSTRUCTIONS = Path("dev/benches/ratios.json"), Path("dev/benches/instructions.json")
+RATIOS = Path("dev/benches/ratios.json")
 TEMPLATE = "performance.md.j2"
 
 
 def render(project: Path) -> str:
-    """The page in Markdown. Depends on the project's files only. Raises UserError if a file with the numbers is missing."""
+    """The page in Markdown. Depends on the project's files only. Raises UserError if the file with the numbers is missing."""
     import jinja2
 
-    ratios, counted = (json.loads(read(project / path)) for path in (RATIOS, INSTRUCTIONS))
+    ratios = json.loads(read(project / RATIOS))
     loader = jinja2.FileSystemLoader(Path(__file__).parent)
     runs = [[_number(pick(row[i] for row in ratios["runs"].values())) for pick in (min, max)] for i in (0, 4)]
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.get_template(TEMPLATE).render(
-        compiler=counted["compiler"],
         step=_number(*ratios["steps"]["angles set, step, 4 outputs, as vectors"]),
         sizes=_number(*ratios["others"]["four alternating sizes / steps of one size"]),
         loop=runs[0],
         fmpy=runs[1],
         table=lambda name, *header: _table(header, ratios[name].items()),
-        instructions=lambda: _table(("use", "instructions"), ((k, [v]) for k, v in counted["instructions"].items())),
     )
 
 

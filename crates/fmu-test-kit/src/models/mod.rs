@@ -1,4 +1,4 @@
-//! Short, complete test models that together use all features of FMI 2.0. Some, such as `Palette` and `Rod`, also use features that only FMI 3.0 has. The README of this crate lists what each is for.
+//! Short, complete test models that together use all features of FMI 2.0. Some, such as `Palette` and `Rod`, also use features that only FMI 3.0 has. Each begins with a comment on what it is for.
 #![allow(missing_docs, reason = "the table of variables describes a model")]
 
 #[path = "../../../fmu-package/models/ball/src/ball.rs"]
