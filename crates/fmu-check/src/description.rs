@@ -15,6 +15,8 @@ use std::ops::Deref;
 #[derive(Clone, Debug)]
 pub struct Description {
     written: ModelDescription,
+    /// The file.
+    pub text: String,
     pub start_time: f64,
     /// Stop time of the default experiment, if it has one.
     pub stop_time: Option<f64>,
@@ -65,6 +67,7 @@ impl Description {
             step_size: step_size.filter(|size| *size > 0.0 && size.is_finite()),
             wrong: written.faults.iter().filter_map(observation).collect(),
             early: early(&written),
+            text: text.to_owned(),
             written,
         };
         let wrong = description.evaluate();

@@ -7,7 +7,6 @@ use crate::description::Description;
 use crate::options::{INTERFACES, Options};
 use crate::rules::Observation;
 use crate::run::Workers;
-use crate::schema;
 use anyhow::{anyhow, bail};
 use fmi_abi::Standard;
 use fmi_abi::files::{MAX_XML, Scratch, read};
@@ -43,8 +42,6 @@ pub fn opened(path: &Path, options: &Options, begin: Instant) -> anyhow::Result<
     if options.wants("description") {
         observations.extend(encoding);
         observations.extend(description.wrong.iter().cloned());
-        let violation = schema::violation(description.standard, &description.version, text);
-        observations.extend(violation.or_else(|| description.unreadable()));
     }
     let (setting, without) = setting(options, directory, &description);
     let checker = Checker::new(description, setting, workers, options, begin);

@@ -1,6 +1,6 @@
 //! Executes call sequences in separate processes.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
+use crate::call_sequence::{CallSequence, End, Outcome, Run, Setting, Step};
 use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
@@ -109,13 +109,14 @@ impl Workers {
                 Manner::Debugged(id) => part.iter().map(|numbered| numbered.id).find(|other| *other == id),
                 Manner::Usual | Manner::Again => None,
             };
-            let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes, stop_before };
+            let stamp = Job::new_stamp();
+            let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes, stop_before, stamp };
             let kind = (phase, setting.now, matches!(manner, Manner::Again));
             let ended = match stop_before {
                 None => self.process(&job, kind, limit)?,
                 Some(_) => self.debugged(&job, kind)?,
             };
-            bytes = add_outcomes(part, ended, limit, &mut run)?;
+            bytes = add_outcomes(&job, ended, limit, &mut run)?;
             if run.end != End::Done {
                 break;
             }
@@ -251,7 +252,7 @@ impl Drop for Server {
 
 /// Adds the outcomes of a process to `run`, and returns the serialized states.
 fn add_outcomes(
-    sequence: &[Numbered],
+    job: &Job,
     ended: Ended,
     limit: f64,
     run: &mut Run,
@@ -259,7 +260,8 @@ fn add_outcomes(
     run.output.push_str(&ended.output);
     run.orphans.extend(ended.orphans);
     let mut last = None;
-    for line in ended.outcomes.lines() {
+    let stamp = format!("{} ", job.stamp);
+    for line in ended.outcomes.lines().filter_map(|line| line.strip_prefix(&stamp)) {
         if let Ok(outcome) = serde_json::from_str::<Outcome>(line) {
             run.outcomes.insert(outcome.id, Arc::new(outcome));
         } else if let Ok(end) = serde_json::from_str::<Last>(line) {
@@ -269,7 +271,10 @@ fn add_outcomes(
             return Ok(HashMap::new());
         }
     }
-    if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED)) {
+    // The exit of the process has no outcome, because it does not return.
+    let steps = job.sequence.iter().filter(|numbered| numbered.step != Step::Quit);
+    run.at = steps.map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
+    if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED) && run.at.is_none()) {
         return Ok(bytes);
     }
     // Rust and guarded arrays print these messages if an allocation fails.
@@ -277,7 +282,7 @@ fn add_outcomes(
     if !ended.inside && no_memory.iter().any(|text| run.output.contains(text)) {
         return Err(Stop::OutOfMemory.into());
     }
-    run.at = sequence.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
+    run.at = job.sequence.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
     run.end = match (ended.flood, ended.code, ended.signal) {
         (Some(count), ..) => End::Flood(count),
         (_, None, None) => End::Hang(limit),
@@ -301,7 +306,10 @@ fn crash(code: Option<i32>, signal: Option<i32>, output: &str) -> String {
         (libc::SIGFPE, "SIGFPE: integer division by zero or overflow, or a trapped floating-point exception"),
         (libc::SIGILL, "SIGILL: illegal instruction"),
         (libc::SIGKILL, "SIGKILL: killed by the process itself or by the out-of-memory killer"),
-        (libc::SIGSYS, "SIGSYS: it sent a signal to processes outside of its session, or changed them"),
+        (
+            libc::SIGSYS,
+            "SIGSYS: it sent a signal to processes outside of its session, changed them, or made 32-bit system calls",
+        ),
         (libc::SIGXFSZ, "SIGXFSZ: it wrote more than 1 GiB to a file"),
     ];
     #[cfg(not(unix))]

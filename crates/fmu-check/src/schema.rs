@@ -1,7 +1,12 @@
 //! Compares model descriptions with the XML schemas of the standard.
 
+use crate::checker::Checker;
 use crate::rules::Observation;
+use crate::run::Stop;
 use fmi_abi::{Standard, shown};
+use std::time::Instant;
+use uppsala::dom::Document;
+use uppsala::error::ValidationError;
 use uppsala::xsd::XsdValidator;
 
 /// Schema of an FMI version, in one file.
@@ -15,19 +20,57 @@ const fn schema(standard: Standard) -> &'static str {
 /// Maximum size of a description that is compared, in bytes, because the comparison of a larger one takes seconds.
 const LARGEST: usize = 20 << 20;
 
+/// Maximum number of violations whose lines are all calculated, because uppsala reads the description up to the violation for each line.
+const MOST_LINES: usize = 100;
+
+/// Number of elements at the beginning in which the line of the first of many violations is looked for.
+const BEGINNING: usize = 1000;
+
+/// Compares the model description with the schema, and records the first violation, or else the first attribute that cannot be read.
+pub fn check(checker: &Checker) -> anyhow::Result<()> {
+    if Instant::now() >= checker.deadline {
+        return Err(Stop::TimeOver.into());
+    }
+    let description = &checker.description;
+    let violation = violation(description.standard, &description.version, &description.text);
+    if let Some((rule, why)) = violation.or_else(|| description.unreadable()) {
+        checker.add(checker.broken(rule, why));
+    }
+    Ok(())
+}
+
 /// Returns the first violation of the schema in a model description of this `fmiVersion`; the others often follow from it. Later
 /// editions of FMI 3 may have more elements, so their descriptions are not compared.
-pub fn violation(standard: Standard, version: &str, text: &str) -> Option<Observation> {
+fn violation(standard: Standard, version: &str, text: &str) -> Option<Observation> {
     if text.len() > LARGEST || !["2.0", "3.0"].contains(&version) {
         return None;
     }
     let validator = uppsala::parse(schema(standard)).and_then(|schema| XsdValidator::from_schema(&schema));
     // The parser of fmi-abi has accepted the description. This one also limits the depth of its elements.
     let (validator, document) = (validator.ok()?, uppsala::parse(text).ok()?);
-    let error = validator.validate(&document).into_iter().next()?;
-    let line = error.line.map_or(String::new(), |line| format!("line {line}: "));
-    let message = error.message.replace(" (no wildcard permits additional attributes)", "");
-    Some(("description.schema", format!("{line}{}", shown(&message))))
+    // A document that owns its strings has no lines.
+    let errors = validator.validate(&document.into_static());
+    let first = errors.first()?;
+    let is_first = |error: &ValidationError| error.message == first.message;
+    let mut document = uppsala::parse(text).ok()?;
+    if errors.len() > MOST_LINES {
+        keep_beginning(&mut document);
+    }
+    let line = validator.validate(&document).into_iter().find(is_first).and_then(|error| error.line);
+    let line = line.map_or(String::new(), |line| format!("line {line}: "));
+    let more = match errors.len() - 1 {
+        count if count >= MOST_LINES => format!(", the first of {} violations", errors.len()),
+        _ => String::new(),
+    };
+    let message = first.message.replace(" (no wildcard permits additional attributes)", "");
+    Some(("description.schema", format!("{line}{}{more}", shown(&message))))
+}
+
+/// Removes all elements after the first `BEGINNING` ones.
+fn keep_beginning(document: &mut Document) {
+    let elements = document.descendants(document.root()).into_iter();
+    let elements: Vec<_> = elements.filter(|node| document.element(*node).is_some()).collect();
+    elements.into_iter().skip(BEGINNING).for_each(|node| document.detach(node));
 }
 
 #[cfg(test)]
@@ -60,5 +103,11 @@ mod tests {
         ] {
             assert!(of(standard, before, after).is_some(), "{before}: {after}");
         }
+        // The lines of so many violations would take minutes.
+        let variable = "<ScalarVariable name='y' valueReference='1' colour='red'><Real/></ScalarVariable>\n";
+        let many =
+            of(Standard::Fmi2, "<ModelVariables>", &format!("<ModelVariables>\n{}", variable.repeat(5000)));
+        let why = "line 8: Attribute 'colour' is not allowed, the first of 5000 violations";
+        assert_eq!(many.as_deref(), Some(why));
     }
 }

@@ -22,9 +22,9 @@ use std::time::{Duration, Instant};
 /// Findings that are reported even if `--only` excludes their topic, because any call may reveal them or because they prevent
 /// other checks. The same holds for the topics `arrays` and `logs`.
 #[rustfmt::skip]
-const ALWAYS: [&str; 6] = [
+const ALWAYS: [&str; 7] = [
     "functions.status", "package.unloadable", "package.symbols",
-    "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
+    "life_cycle.simulation", "life_cycle.crash", "life_cycle.exit", "life_cycle.hang",
 ];
 
 /// Checks an FMU, and shows the progress on the standard error.
@@ -93,7 +93,9 @@ impl Session {
         let Self { options, checker, .. } = self;
         // The report is written after every check, so that earlier findings are not lost if this process is killed.
         let write_report = || match &options.out {
-            Some(directory) => self.report(self.wanted_findings()).write(directory),
+            Some(directory) => {
+                self.report(self.wanted_findings(), "the check had not ended").write(directory)
+            }
             None => Ok(()),
         };
         execute_checks(checker, progress, &|name| options.wants(name), &write_report)?;
@@ -109,7 +111,7 @@ impl Session {
         now > self.checker.end + GRACE || worker::interrupted_at().is_some_and(|at| now > at + GRACE)
     }
 
-    /// Returns the report. A finding whose calls have not been repeated is a note in it.
+    /// Returns the report at the end.
     fn final_report(&self) -> Report {
         let findings = match self.findings.get() {
             None => self.wanted_findings(),
@@ -122,14 +124,8 @@ impl Session {
                 slots.iter().zip(all).map(of).collect()
             }
         };
-        let judged = findings.into_iter().map(|mut finding| {
-            if finding.criterion.is_some() && finding.proof == Proof::Files {
-                let stop = if worker::interrupted() { Stop::Interrupted } else { Stop::TimeOver };
-                finding.judge(Proof::NotRun(stop.to_string()));
-            }
-            finding
-        });
-        self.report(judged.collect())
+        let stop = if worker::interrupted() { Stop::Interrupted } else { Stop::TimeOver };
+        self.report(findings, &stop.to_string())
     }
 
     /// Returns the findings so far that the options ask for, the most severe first.
@@ -145,7 +141,12 @@ impl Session {
         findings
     }
 
-    fn report(&self, mut findings: Vec<Finding>) -> Report {
+    /// Returns the report. A finding whose calls have not been repeated is a note in it, for this reason.
+    fn report(&self, mut findings: Vec<Finding>, why: &str) -> Report {
+        let is_open = |finding: &&mut Finding| finding.criterion.is_some() && finding.proof == Proof::Files;
+        for finding in findings.iter_mut().filter(is_open) {
+            finding.judge(Proof::NotRun(why.to_owned()));
+        }
         sort(&mut findings);
         let mut report = Report::new(&self.path, &self.checker, findings);
         report.seconds = self.begin.elapsed().as_secs_f64();

@@ -61,7 +61,30 @@ static void attack(void) {
     if (IS(slows_parent)) setpriority(PRIO_PROCESS, getppid(), 19);
     if (IS(moves_parent)) { cpu_set_t first; CPU_ZERO(&first); CPU_SET(0, &first); sched_setaffinity(getppid(), sizeof first, &first); }
     if (IS(traces_parent)) ptrace(PTRACE_ATTACH, getppid(), NULL, NULL);
+    if (IS(owns_file_of_parent)) {
+        /* The kernel sends the signal when the pipe becomes readable. Signal 0 stands for SIGIO. */
+        int ends[2];
+        if (pipe(ends)) return;
+        fcntl(ends[0], F_SETOWN, getppid());
+        fcntl(ends[0], F_SETFL, O_ASYNC);
+        if (write(ends[1], "", 1)) sleep(1);
+    }
+    if (IS(opens_parent)) {
+        char name[40];
+        snprintf(name, sizeof name, "/proc/%d", (int)getppid());
+        /* 424 is pidfd_send_signal, which also takes the directory of a process. */
+        if (syscall(424, open(name, O_RDONLY | O_DIRECTORY), SIGKILL, NULL, 0)) abort();
+    }
+#ifdef __x86_64__
+    /* 37 is kill for programs of 32 bits. */
+    if (IS(kills_with_32_bits)) __asm__ volatile("int $0x80" : : "a"(37), "b"(getppid()), "c"(SIGKILL) : "memory");
 #endif
+#endif
+    /* Ends as if all calls had been made: writes their end to the files of the process. */
+    if (IS(forges_results)) {
+        for (int file = 3; file < 64; file++) if (write(file, "{\"bytes\":{}}\n", 13) < 0) continue;
+        _exit(96);
+    }
     if (IS(make_hangs)) for (;;) pause();
 }
 

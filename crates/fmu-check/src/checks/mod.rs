@@ -39,6 +39,7 @@ pub mod vectors;
 
 use crate::call_sequence::CallSequence;
 use crate::checker::Checker;
+use crate::schema;
 use crate::writer::Trajectory;
 use Check::{Each, Malformed, Once};
 use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
@@ -91,8 +92,9 @@ impl Fits {
     }
 }
 
-/// Topic and function of every check that calls the library. A check that can be requested separately has the name of its rule instead.
+/// Topic and function of every check that takes time. A check that can be requested separately has the name of its rule instead.
 pub const ALL: &[(&str, Check)] = &[
+    ("description", Once(schema::check)),
     ("life_cycle", Each(Always, life_cycle::sequences)),
     ("life_cycle", Once(life_cycle::free_null)),
     ("states", Each(Saves, states::restore)),

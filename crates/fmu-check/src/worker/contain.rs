@@ -231,6 +231,24 @@ mod linux {
     /// System calls of this kind whose second argument is the process.
     const BY_SECOND: [libc::c_long; 3] = [libc::SYS_ptrace, libc::SYS_setpriority, libc::SYS_ioprio_set];
 
+    /// Commands of fcntl and ioctl that choose the process or process group to which the kernel sends a signal when a file is ready.
+    const F_SETOWN_EX: i32 = 15;
+    const FIOSETOWN: i32 = 0x8901;
+    const SIOCSPGRP: i32 = 0x8902;
+
+    /// Architecture of this program in system calls. The same system calls have other numbers in other architectures, so a process that
+    /// uses them is ended.
+    const ARCHITECTURE: Option<u32> = if cfg!(target_arch = "x86_64") {
+        Some(0xc000_003e)
+    } else if cfg!(target_arch = "aarch64") {
+        Some(0xc000_00b7)
+    } else {
+        None
+    };
+
+    /// On x86-64, numbers of system calls from here on belong to x32, another interface to the same calls.
+    const X32: i32 = 0x4000_0000;
+
     /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if it sends a signal to
     /// a process of the checker or to all processes, or changes such a process.
     pub fn isolate(checker: libc::pid_t) {
@@ -242,27 +260,7 @@ mod linux {
         };
         let mut targets = vec![-1, server, -server, checker, -checker, group, -group, caller];
         targets.retain(|target| *target != 0);
-        let step = |code: u32, jt, jf, k: i32| libc::sock_filter { code: code as u16, jt, jf, k: k as u32 };
-        let load = |offset| step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
-        let equals = |number: i32, jt, jf| step(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt, jf, number);
-        let end = |action: u32| step(libc::BPF_RET | libc::BPF_K, 0, 0, action as i32);
-        let count = targets.len() as u8;
-        // seccomp_data has the number of the system call at offset 0, the first argument at offset 16, the second one at 24.
-        let mut program = vec![];
-        for (calls, argument) in [(&BY_FIRST[..], 16), (&BY_SECOND[..], 24)] {
-            program.push(load(0));
-            for (call, rest) in calls.iter().zip((0..calls.len() as u8).rev()) {
-                // The last comparison skips the argument, the targets and the end.
-                let otherwise = if rest == 0 { count + 3 } else { 0 };
-                program.push(equals(*call as i32, rest, otherwise));
-            }
-            program.push(load(argument));
-            for (target, rest) in targets.iter().zip((0..count).rev()) {
-                program.push(equals(*target, rest + 1, 0));
-            }
-            program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
-        }
-        program.push(end(libc::SECCOMP_RET_ALLOW));
+        let mut program = filter(&targets);
         let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
         // SAFETY: the filter is for this process and its descendants. If the kernel does not support filters, all system calls
         // are allowed.
@@ -271,6 +269,59 @@ mod linux {
             libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter);
         }
     }
+
+    /// Returns the filter that protects these processes and process groups.
+    fn filter(targets: &[i32]) -> Vec<libc::sock_filter> {
+        let step = |code: u32, jt, jf, k: i32| libc::sock_filter { code: code as u16, jt, jf, k: k as u32 };
+        let load = |offset| step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
+        let end = |action: u32| step(libc::BPF_RET | libc::BPF_K, 0, 0, action as i32);
+        let jump = |test: u32, number, jt, jf| step(libc::BPF_JMP | test | libc::BPF_K, jt, jf, number);
+        // Executes `body` if the word at this offset is one of these numbers.
+        let when = |offset, numbers: &[i32], body: Vec<libc::sock_filter>| {
+            let mut all = vec![load(offset)];
+            for (number, rest) in numbers.iter().zip((0..numbers.len() as u8).rev()) {
+                let otherwise = if rest == 0 { body.len() as u8 } else { 0 };
+                all.push(jump(libc::BPF_JEQ, *number, rest, otherwise));
+            }
+            all.extend(body);
+            all
+        };
+        let call = |calls: &[libc::c_long], body| {
+            when(NUMBER, &calls.iter().map(|call| *call as i32).collect::<Vec<_>>(), body)
+        };
+        let ends = || vec![end(libc::SECCOMP_RET_KILL_PROCESS)];
+        let fails = |error: i32| vec![end(libc::SECCOMP_RET_ERRNO | error as u32)];
+        let mut program = Vec::new();
+        if let Some(architecture) = ARCHITECTURE {
+            program.extend([load(ARCH), jump(libc::BPF_JEQ, architecture as i32, 1, 0)]);
+            program.extend(ends());
+        }
+        if cfg!(target_arch = "x86_64") {
+            program.extend([load(NUMBER), jump(libc::BPF_JGE, X32, 0, 1)]);
+            program.extend(fails(libc::ENOSYS));
+        }
+        // A program that gets these errors uses the older call, which has the process as a number.
+        let owners = [FIOSETOWN, SIOCSPGRP];
+        for part in [
+            call(&BY_FIRST, when(FIRST, targets, ends())),
+            call(&BY_SECOND, when(SECOND, targets, ends())),
+            call(&[libc::SYS_fcntl], when(SECOND, &[libc::F_SETOWN], when(THIRD, targets, ends()))),
+            call(&[libc::SYS_fcntl], when(SECOND, &[F_SETOWN_EX], fails(libc::EINVAL))),
+            call(&[libc::SYS_ioctl], when(SECOND, &owners, fails(libc::EINVAL))),
+            call(&[libc::SYS_pidfd_send_signal], fails(libc::ENOSYS)),
+            vec![end(libc::SECCOMP_RET_ALLOW)],
+        ] {
+            program.extend(part);
+        }
+        program
+    }
+
+    /// Offsets in seccomp_data: of the number of the system call, the architecture, and the lower words of the arguments.
+    const NUMBER: i32 = 0;
+    const ARCH: i32 = 4;
+    const FIRST: i32 = 16;
+    const SECOND: i32 = 24;
+    const THIRD: i32 = 32;
 
     fn parent_of(pid: libc::pid_t) -> libc::pid_t {
         let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();

@@ -67,10 +67,12 @@ pub struct Executor {
     pub file: Mutex<File>,
     /// Number of the step before which this process waits for a debugger.
     pub stop_before: Option<u32>,
+    /// Stamp of the job.
+    pub stamp: u64,
 }
 
 impl Executor {
-    /// Writes a line of JSON to the file.
+    /// Writes a line with the stamp of the job and JSON to the file.
     pub fn write(&self, line: &impl Serialize) {
         #[cfg(unix)]
         if std::process::id() != PROCESS.load(Ordering::Relaxed) {
@@ -80,10 +82,12 @@ impl Executor {
                 unsafe { libc::pause() };
             }
         }
-        let mut line = serde_json::to_vec(line).unwrap_or_default();
-        line.push(b'\n');
+        let mut text = format!("{} ", self.stamp).into_bytes();
+        if serde_json::to_writer(&mut text, line).is_ok() {
+            text.push(b'\n');
+        }
         // If the disk is full, results are lost, and the checker reports that the process has ended early.
-        let _ = locked(&self.file).write_all(&line);
+        let _ = locked(&self.file).write_all(&text);
     }
 
     /// Returns the FMI version of the FMU.

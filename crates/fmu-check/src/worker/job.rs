@@ -3,6 +3,7 @@
 use crate::call_sequence::{CallSequence, Setting};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::process::ExitStatus;
 
 /// Environment variable with the path of the job of a worker; empty for a server.
@@ -30,6 +31,15 @@ pub struct Job {
     pub bytes: HashMap<usize, Vec<u8>>,
     /// Number of the step before which the process waits for a debugger.
     pub stop_before: Option<u32>,
+    /// Random number with which each line of the outcomes begins, because the FMU could write to their file, too.
+    pub stamp: u64,
+}
+
+impl Job {
+    /// Returns a random number for a job.
+    pub fn new_stamp() -> u64 {
+        RandomState::new().build_hasher().finish()
+    }
 }
 
 /// Results of a process. A process that was ended because it exceeded a limit has neither an exit status nor a signal.
@@ -41,7 +51,7 @@ pub struct Ended {
     pub signal: Option<i32>,
     /// Standard output and standard error.
     pub output: String,
-    /// Outcomes of the steps, a line of JSON for each.
+    /// Outcomes of the steps, a line for each, which has the stamp of the job and JSON.
     pub outcomes: String,
     /// Names of the child processes that were alive after the process had ended.
     pub orphans: Vec<String>,

@@ -29,7 +29,7 @@ pub fn end(result: Result<(), String>) -> ! {
     std::process::exit(status)
 }
 
-/// Executes a call sequence, and writes the outcome of each step to the file, as a line of JSON.
+/// Executes a call sequence, and writes the outcome of each step to the file, as a line with the stamp of the job and JSON.
 pub fn work(job: Job, file: File) {
     limit(job.setting.memory);
     PROCESS.store(std::process::id(), Ordering::Relaxed);
@@ -53,6 +53,7 @@ pub fn work(job: Job, file: File) {
         sizes: Mutex::default(),
         file: Mutex::new(file),
         stop_before: job.stop_before,
+        stamp: job.stamp,
     };
     executor.execute(&job.sequence, true);
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });

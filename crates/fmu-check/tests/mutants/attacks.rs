@@ -5,20 +5,25 @@ use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Faults that start processes, or send signals to other processes or change them: FMI version, fault and name of the finding.
-pub const ATTACKS: [(u32, &str, &str); 12] = [
-    (2, "forks", "resources.processes"),
-    (3, "daemon_left", "resources.processes"),
-    (2, "forks_without_end", "resources.processes"),
-    (3, "duplicates_itself", "resources.processes"),
-    (2, "kills_group", "life_cycle.crash"),
-    (3, "kills_parent", "life_cycle.crash"),
-    (2, "kills_all", "life_cycle.crash"),
-    (3, "stops_parent", "life_cycle.crash"),
-    (2, "limits_parent", "life_cycle.crash"),
-    (3, "slows_parent", "life_cycle.crash"),
-    (2, "moves_parent", "life_cycle.crash"),
-    (3, "traces_parent", "life_cycle.crash"),
+/// Faults that start processes, send signals to other processes or change them, or pretend that all calls have returned: FMI version,
+/// fault, name of the finding, and a part of its observation.
+pub const ATTACKS: [(u32, &str, &str, &str); 16] = [
+    (2, "forks", "resources.processes", ""),
+    (3, "daemon_left", "resources.processes", ""),
+    (2, "forks_without_end", "resources.processes", ""),
+    (3, "duplicates_itself", "resources.processes", ""),
+    (2, "kills_group", "life_cycle.crash", "SIGKILL"),
+    (3, "kills_parent", "life_cycle.crash", "SIGSYS"),
+    (2, "kills_all", "life_cycle.crash", "SIGSYS"),
+    (3, "stops_parent", "life_cycle.crash", "SIGSYS"),
+    (2, "limits_parent", "life_cycle.crash", "SIGSYS"),
+    (3, "slows_parent", "life_cycle.crash", "SIGSYS"),
+    (2, "moves_parent", "life_cycle.crash", "SIGSYS"),
+    (3, "traces_parent", "life_cycle.crash", "SIGSYS"),
+    (2, "owns_file_of_parent", "life_cycle.crash", "SIGSYS"),
+    (3, "opens_parent", "life_cycle.crash", "SIGABRT"),
+    (2, "kills_with_32_bits", "life_cycle.crash", "SIGSYS"),
+    (3, "forges_results", "life_cycle.exit", "exit status 96"),
 ];
 
 /// Returns the number of processes whose environment contains this mark.
@@ -47,12 +52,13 @@ fn contained(directory: &Path, fmi: u32, fault: &str) -> Command {
 #[cfg(target_os = "linux")]
 #[test]
 fn attacks_are_contained() {
-    for (fmi, fault, name) in ATTACKS {
+    for (fmi, fault, name, observed) in ATTACKS {
         let directory = TempDir::new().expect("a directory");
         let mut command = contained(directory.path(), fmi, fault);
         let output = command.args(["--only", "resources", "--limit", "0.5"]).output().expect("runs");
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(text.contains(&format!("\"name\": \"{name}\"")), "{fault}: {text} {output:?}");
+        assert!(text.contains(observed), "{fault}: {text}");
         assert_eq!(output.status.code(), Some(1), "{fault}");
         assert_eq!(marked(&directory.path().to_string_lossy()), 0, "{fault}");
         assert_eq!(
@@ -98,6 +104,28 @@ fn interrupts_leave_nothing() {
         }
         wait_until(|| marked(&mark) == 0 && std::fs::read_dir(&scratch).is_ok_and(|of| of.count() == 0));
     }
+}
+
+/// Asserts that a check that is killed leaves no violation in its report, because its calls have not been repeated.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interim_report_has_no_unproven_violation() {
+    let directory = TempDir::new().expect("a directory");
+    let out = directory.path().join("out");
+    let mut command = contained(directory.path(), 2, "start_value");
+    let mut child = command.arg("--out").arg(&out).stdout(std::process::Stdio::null()).spawn().expect("runs");
+    let interim = || -> Option<serde_json::Value> {
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(out.join("report.json")).ok()?).expect("JSON");
+        let findings = report["findings"].as_array().expect("a list");
+        findings.iter().find(|finding| finding["name"] == "start_values.start").cloned()
+    };
+    wait_until(|| interim().is_some());
+    let finding = interim().expect("a finding");
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    assert_eq!(finding["severity"], "note", "{finding:#}");
+    assert_eq!(finding["proof"]["notrun"], "the check had not ended", "{finding:#}");
 }
 
 /// Waits for a condition, without a limit because the machine may be busy. The test runner ends a test that waits forever.

@@ -306,7 +306,7 @@ fn no_fault_is_forgotten() {
     let mut faults: BTreeSet<&str> = faults.filter(|name| !OF_RUNNERS.contains(name)).collect();
     assert!(faults.remove("name") && faults.remove("unusual"));
     let mut of_wagon: Vec<_> =
-        FAULTS.iter().chain(TOGETHER).chain(ATTACKS.iter().map(|(_, name, _)| name)).collect();
+        FAULTS.iter().chain(TOGETHER).chain(ATTACKS.iter().map(|(_, name, ..)| name)).collect();
     of_wagon.push(&"make_hangs");
     for name in &of_wagon {
         assert!(faults.remove(**name), "there is no {name}");
