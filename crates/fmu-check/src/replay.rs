@@ -31,6 +31,12 @@ pub struct ReplayOptions {
     /// Executes the calls this many times.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub times: usize,
+    /// Maximum duration of an execution of the calls in seconds. The report may state a shorter one.
+    #[arg(long, default_value_t = 150.0)]
+    pub limit: f64,
+    /// Megabytes of memory that the FMU may use. The report may state fewer.
+    #[arg(long, default_value_t = 8192)]
+    pub memory: u64,
     /// Waits before the last call, so that you can attach a debugger and step into the FMU.
     #[arg(long = "break")]
     pub wait: bool,
@@ -79,23 +85,28 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
         )
     };
     let path = options.fmu.as_ref().unwrap_or(&report.fmu);
-    let unpacking = Options { execution_tool: true, memory: replay.memory >> 20, ..Options::default() };
+    // Someone else may have written the report, so it cannot exceed the limits of the user.
+    let memory = options.memory.min(replay.memory >> 20);
+    let unpacking = Options { execution_tool: true, memory, ..Options::default() };
     // The checker is dropped before the directory is removed, because its processes use the directory until they end.
     let (_scratch, checker) = opened(path, &unpacking, Instant::now())
         .context("the FMU cannot be called; --fmu names another file")?;
     let description = &checker.description;
+    check_calls(&replay.sequence, description.standard)?;
     let folded = with_token(&replay.sequence, &report.token, &description.token);
-    check_calls(&folded, description.standard)?;
     let sequence = unfold(&folded);
     check_libraries(&sequence, &checker)?;
-    let Replay { soft, now, repetitions, limit, ref evidence, .. } = *replay;
+    let Replay { soft, now, ref evidence, .. } = *replay;
+    let (limit, repetitions) = (options.limit.min(replay.limit), options.limit.min(replay.repetitions));
     let setting = Setting { soft, now, repetitions, ..checker.setting.clone() };
+    let threads = sequence.iter().any(|numbered| matches!(numbered.step, Step::Parallel(_)));
+    let attempts = if threads { options.times.max(MOST_ATTEMPTS) } else { options.times };
     let last = last(&sequence, evidence).filter(|_| options.wait);
     let manner = last.map_or(Manner::Usual, Manner::Debugged);
     print(&format!("Finding {number} of {}: {}", options.report.display(), finding.name));
     print(&format!("Observed: {}", finding.observed));
     let mut shown = 0;
-    for time in 1..=options.times {
+    for time in 1..=attempts {
         let run = checker.workers.execute_as(manner, &setting, &sequence, limit)?;
         let again = || checker.workers.execute_as(Manner::Again, &setting, &sequence, limit);
         let other = if evidence.varies() { Some(again()?) } else { None };
@@ -110,8 +121,11 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
                 .iter()
                 .for_each(|line| print(&format!("      {line}")));
         }
-        if options.times > 1 {
+        if attempts > 1 {
             print(&format!("Repetition {time}: {}", if shows { "shown" } else { "not shown" }));
+        }
+        if shows && time >= options.times {
+            break;
         }
     }
     if *evidence == Evidence::Unknown {
@@ -119,7 +133,11 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
             "the report does not contain the results that show the finding, because no repetition has shown it"
         );
     }
-    print(if shown > 0 { "The finding shows." } else { "The finding does not show." });
+    match attempts {
+        _ if shown > 0 => print("The finding shows."),
+        1 => print("The finding does not show."),
+        _ => print(&format!("The finding does not show in {attempts} repetitions.")),
+    }
     Ok(shown > 0)
 }
 
@@ -171,18 +189,18 @@ fn with_token(sequence: &[Numbered], reported: &str, token: &str) -> CallSequenc
 }
 
 /// Checks that each function is one of the FMI version and gets the number of its arguments, that the directory of the FMU stays in the
-/// temporary directory, and that copies do not fill the memory, because someone else may have written the report.
+/// temporary directory, and that copies, arrays and threads are not too many, because someone else may have written the report.
 fn check_calls(sequence: &[Numbered], standard: Standard) -> anyhow::Result<()> {
-    if length(sequence) > MOST_STEPS {
-        bail!("the finding has more than {MOST_STEPS} calls");
+    if memory_of(sequence) > MOST_MEMORY {
+        bail!("the calls of the finding need more than {} MB with all copies and results", MOST_MEMORY >> 20);
     }
     let find = |function: &str| signatures(standard).iter().find(|signature| signature.rule.name == function);
     for numbered in all_steps(sequence) {
         let is_valid = match &numbered.step {
             Step::Call { function, args, .. } => {
                 find(function).is_some_and(|signature| signature.arguments.len() == args.len())
-                    && !args.iter().any(|arg| matches!(arg, Arg::Out(_, count) if *count > MOST_RESULTS))
             }
+            Step::Parallel(sequences) => sequences.len() <= MOST_THREADS,
             Step::Version(name) => VERSIONS.contains(&name.as_str()),
             Step::Elsewhere(name) => {
                 !name.is_empty() && !name.contains(['/', '\\']) && name != "." && name != ".."
@@ -210,24 +228,39 @@ fn check_libraries(sequence: &CallSequence, checker: &Checker) -> anyhow::Result
     Ok(())
 }
 
-/// Returns the number of steps, with all copies.
-fn length(sequence: &[Numbered]) -> usize {
-    let of_step = |numbered: &Numbered| match &numbered.step {
-        Step::Copies(times, _, steps) => times.saturating_mul(length(steps).max(1)),
-        Step::Repeat(_, steps) => length(steps),
-        Step::Parallel(sequences) => {
-            sequences.iter().map(|steps| length(steps)).fold(0, usize::saturating_add)
-        }
-        _ => 1,
+/// Returns the number of bytes that the steps need, with all copies and results.
+fn memory_of(sequence: &[Numbered]) -> usize {
+    let sum = |all: &mut dyn Iterator<Item = usize>| all.fold(0, usize::saturating_add);
+    let of_arg = |arg: &Arg| match arg {
+        Arg::In(_, words) => WORD * words.len(),
+        Arg::Strings(texts) => texts.iter().map(|text| WORD + text.as_ref().map_or(0, Vec::len)).sum(),
+        Arg::Blobs(blobs) => blobs.iter().map(|blob| WORD + blob.len()).sum(),
+        Arg::Out(_, count) => count.saturating_mul(WORD),
+        _ => WORD,
     };
-    sequence.iter().map(of_step).fold(0, usize::saturating_add)
+    let of_step = |numbered: &Numbered| match &numbered.step {
+        Step::Copies(times, _, steps) => times.saturating_mul(memory_of(steps)),
+        Step::Repeat(_, steps) => memory_of(steps),
+        Step::Parallel(sequences) => sum(&mut sequences.iter().map(|steps| memory_of(steps))),
+        Step::Call { args, .. } => sum(&mut args.iter().map(of_arg)),
+        Step::Integrate(_, how) => how.states.saturating_add(how.indicators).saturating_mul(WORD),
+        _ => 0,
+    };
+    STEP.saturating_add(sum(&mut sequence.iter().map(|numbered| STEP.saturating_add(of_step(numbered)))))
 }
 
-/// Maximum number of steps of a finding.
-const MOST_STEPS: usize = 1 << 20;
+/// Upper bounds for the memory of a step without its arrays, and of a value in an array, in bytes.
+const STEP: usize = 256;
+const WORD: usize = 32;
 
-/// Maximum number of results of a call.
-const MOST_RESULTS: usize = 1 << 26;
+/// Maximum memory of the calls of a finding in bytes.
+const MOST_MEMORY: usize = 1 << 29;
+
+/// Maximum number of threads of a finding.
+const MOST_THREADS: usize = 64;
+
+/// Number of executions in which a finding on threads must show, because its results may be different each time.
+const MOST_ATTEMPTS: usize = 5;
 
 /// Functions without an argument.
 const VERSIONS: [&str; 3] = ["fmi2GetVersion", "fmi3GetVersion", "fmi2GetTypesPlatform"];
@@ -246,7 +279,7 @@ fn last(sequence: &CallSequence, evidence: &Evidence) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::check_calls;
-    use crate::call_sequence::{Arg, Numbered, Step};
+    use crate::call_sequence::{Arg, Kind, Numbered, Step};
     use fmi_abi::Standard;
 
     #[test]
@@ -263,10 +296,17 @@ mod tests {
         assert!(!valid(call("system", Vec::new())) && !valid(call("fmi3Reset", Vec::new())));
         assert!(valid(Step::Elsewhere("a b%".to_owned())) && !valid(Step::Elsewhere("../here".to_owned())));
         assert!(!valid(Step::Version("abort".to_owned())));
-        let copied = Numbered { id: 1, forbidden: false, step: Step::Measure };
-        assert!(valid(Step::Copies(20, 1, vec![copied.clone()])));
-        assert!(
-            !valid(Step::Copies(1 << 40, 1, vec![copied])) && !valid(Step::Copies(1 << 40, 1, Vec::new()))
-        );
+        assert!(valid(Step::Parallel(vec![Vec::new(); 64])) && !valid(Step::Parallel(vec![Vec::new(); 65])));
+        let numbered = |step: Step| vec![Numbered { id: 1, forbidden: false, step }];
+        let copies = |times: usize, step: Step| valid(Step::Copies(times, 1, numbered(step)));
+        assert!(copies(20, Step::Measure) && !copies(1 << 40, Step::Measure));
+        assert!(!valid(Step::Copies(1 << 40, 1, Vec::new())));
+        // Half a million copies are not too many, unless each of them has a large array.
+        let set = |count| call("fmi2DeSerializeFMUstate", vec![Arg::In(Kind::U8, vec![0; count]); 3]);
+        assert!(copies(1 << 19, set(1)) && !copies(1 << 19, set(100)));
+        let results = |count| call("fmi2GetReal", vec![Arg::Null, Arg::Null, Arg::Out(Kind::F64, count)]);
+        assert!(valid(results(1 << 20)) && !valid(results(usize::MAX)));
+        let nested = (0..8).fold(Step::Measure, |step, _| Step::Copies(20, 1, numbered(step)));
+        assert!(!valid(Step::Parallel(vec![numbered(nested)])));
     }
 }
