@@ -63,7 +63,7 @@ jobs = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(1))
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test test-long compile-tests test-rust test-crates test-docs check-windows test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test test-long compile-tests test-rust test-crates test-docs check-windows test-python test-fmu test-newest-fmpy test-page fmu bench instructions figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-bare-metal test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -100,6 +100,7 @@ help:
 	@echo '                             ARM) and for Windows (Intel), reference experiments, checksums, release notes'
 	@echo 'make source-fmu              build the FMU as C sources for real-time targets -> $(SOURCE_FMU)'
 	@echo 'make test-source-fmu         compile the C sources with every installed compiler and compare with the library'
+	@echo 'make test-bare-metal         run the C sources on a Cortex-M7 without an operating system, which QEMU emulates'
 	@echo 'make test-platforms          build the release, run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       build the release twice and compare every byte'
 	@echo 'make study                   install the packages for prw identify, excite, sweep and check (see python/prw/tutorial.md)'
@@ -276,6 +277,9 @@ source-fmu: need-rust $(VENV)/wasm2c.stamp $(if $(PROGRAMS),compile-tests)
 test-source-fmu: source-fmu fmu $(VENV)/tests.stamp
 	@$(WITH_WASM2C) $(BUILD_CONTROLLER) --c-sources
 	$(PYTEST) tests/source_fmu
+
+test-bare-metal: source-fmu fmu $(VENV)/tests.stamp
+	$(PYTEST) -n 0 -s tests/source_fmu/test_bare_metal.py
 
 test-platforms: release source-fmu $(DIST_VENV)/test-platforms.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms

@@ -17,6 +17,8 @@ PACKAGES = {
     "qemu-aarch64": "qemu-user",
     "arm-linux-gnueabihf-gcc": "gcc-arm-linux-gnueabihf libc6-dev-armhf-cross",
     "qemu-arm": "qemu-user",
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    "qemu-system-arm": "qemu-system-arm",
     "clang": "clang",
     "chromium": "chromium",
     "firefox-esr": "firefox-esr",

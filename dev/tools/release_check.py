@@ -23,6 +23,7 @@ PARTS = {
     "newest FMPy": ("test-newest-fmpy",),
     "page in browsers": ("test-page",),
     "C sources": ("test-source-fmu",),
+    "C sources on bare metal": ("test-bare-metal",),
     "release and platforms": ("test-platforms",),
     "reproducible bytes": ("test-reproducible",),
     "sanitizers, Miri, valgrind": ("sanitize",),

@@ -20,6 +20,9 @@ CONTROLLER = SOURCE_FMU.with_name("prw_controller.fmu")
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
+OUTPUTS = ("tau1", "tau2", "pitch", "roll")
+
+
 @dataclass(frozen=True)
 class Compiler:
     """A C compiler. `start` begins the command that runs its programs here; it is None if they cannot run here."""
@@ -73,6 +76,12 @@ def unpack(fmu: Path, directory: Path) -> Path:
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(directory)
     return directory / "sources"
+
+
+def references(description: fmpy.model_description.ModelDescription) -> list[int]:
+    """Returns the value references of the motor angles and the outputs."""
+    by_name = {variable.name: variable.valueReference for variable in description.modelVariables}
+    return [by_name[name] for name in ("theta1", "theta2", *OUTPUTS)]
 
 
 @pytest.fixture(scope="session")

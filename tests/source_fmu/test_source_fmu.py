@@ -14,11 +14,10 @@ import fmpy
 import numpy as np
 import pytest
 import rebuild
-from conftest import COMPILERS, CONTROLLER, FMU, HEADERS, ROOT, SOURCE_FMU, unpack
+from conftest import COMPILERS, CONTROLLER, FMU, HEADERS, ROOT, SOURCE_FMU, references, unpack
 from fmpy.fmi2 import FMU2Slave
 
 HERE = Path(__file__).parent
-OUTPUTS = ("tau1", "tau2", "pitch", "roll")
 STRICT = ("-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror")
 #: Default of FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB: two that the testbed needs from the beginning, and
 #: two more for saved states.
@@ -29,12 +28,6 @@ MEMORY = 4
 def description() -> fmpy.model_description.ModelDescription:
     """The description of the source FMU, checked against the schema."""
     return fmpy.read_model_description(str(SOURCE_FMU), validate=True)
-
-
-def references(description: fmpy.model_description.ModelDescription) -> list[int]:
-    """Returns the value references of the motor angles and the outputs."""
-    by_name = {variable.name: variable.valueReference for variable in description.modelVariables}
-    return [by_name[name] for name in ("theta1", "theta2", *OUTPUTS)]
 
 
 @pytest.fixture(scope="module")
