@@ -47,6 +47,24 @@ fn blanks_around_numbers_and_booleans_do_not_count() {
     assert_eq!((&*x.start, x.is_relative, x.causality), (&["7".to_owned()][..], true, Causality::Parameter));
 }
 
+/// A unit that is written has all digits, so it is the same when it is read.
+#[cfg(all(feature = "calls", feature = "write"))]
+#[test]
+fn units_are_read_as_they_are_written() {
+    let mut random = fmi_abi::calls::Random::mixed(1);
+    for _ in 0..1000 {
+        let exponents = std::array::from_fn(|_| random.below(7) as i32 - 3);
+        let mut number = |default: f64| {
+            let number = f64::from_bits(random.bits());
+            if random.chance(0.3) || !number.is_finite() { default } else { number }
+        };
+        let written = BaseUnit { exponents, factor: number(1.0), offset: number(0.0) };
+        let document = written.element("BaseUnit").document().unwrap();
+        let document = fmi_abi::xml::parse(&document, "unit").unwrap();
+        assert_eq!(BaseUnit::read(document.root_element()), Ok(written));
+    }
+}
+
 #[test]
 fn attributes_that_cannot_be_read_are_reported() {
     let faults = |found: ModelDescription| {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 /// A conversion: between units, or a transformation of SSP (section 4.5.2 of SSP 1.0). The default changes nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Change(Vec<Step>);
+pub(crate) struct Change(Vec<Operation>);
 
 #[derive(Clone, Debug, PartialEq)]
-enum Step {
+enum Operation {
     /// factor * value + offset.
     Linear(f64, f64),
     /// Pairs of a value and the value that replaces it; all other values stay. If `is_inverse`, the values of each pair are swapped.
@@ -21,24 +21,24 @@ impl Change {
         if (factor, offset) == (1.0, 0.0) {
             Self::default()
         } else {
-            Self(vec![Step::Linear(factor, offset)])
+            Self(vec![Operation::Linear(factor, offset)])
         }
     }
 
     /// Returns the change that replaces values: each pair is a value and its replacement.
     pub fn map(pairs: Vec<(f64, f64)>) -> Self {
-        Self(vec![Step::Map { pairs: pairs.into(), is_inverse: false }])
+        Self(vec![Operation::Map { pairs: pairs.into(), is_inverse: false }])
     }
 
     /// Returns this change followed by another one.
     #[must_use]
     pub fn then(mut self, next: &Self) -> Self {
-        for step in &next.0 {
-            match (self.0.last_mut(), step) {
-                (Some(Step::Linear(f, o)), Step::Linear(factor, offset)) => {
+        for operation in &next.0 {
+            match (self.0.last_mut(), operation) {
+                (Some(Operation::Linear(f, o)), Operation::Linear(factor, offset)) => {
                     (*f, *o) = (factor * *f, factor * *o + offset);
                 }
-                _ => self.0.push(step.clone()),
+                _ => self.0.push(operation.clone()),
             }
         }
         self
@@ -46,10 +46,10 @@ impl Change {
 
     /// Returns the opposite change. Values that the change does not result in become NaN, or stay as they are.
     pub fn inverse(&self) -> Self {
-        let inverse = |step: &Step| match step {
-            Step::Linear(factor, offset) => Step::Linear(1.0 / factor, -offset / factor),
-            Step::Map { pairs, is_inverse } => {
-                Step::Map { pairs: Arc::clone(pairs), is_inverse: !is_inverse }
+        let inverse = |operation: &Operation| match operation {
+            Operation::Linear(factor, offset) => Operation::Linear(1.0 / factor, -offset / factor),
+            Operation::Map { pairs, is_inverse } => {
+                Operation::Map { pairs: Arc::clone(pairs), is_inverse: !is_inverse }
             }
         };
         Self(self.0.iter().rev().map(inverse).collect())
@@ -61,21 +61,21 @@ impl Change {
 
     /// Returns how often the change replaces single values.
     pub fn maps(&self) -> usize {
-        self.0.iter().filter(|step| matches!(step, Step::Map { .. })).count()
+        self.0.iter().filter(|operation| matches!(operation, Operation::Map { .. })).count()
     }
 
     /// Returns whether the change calculates with values, which must be Real.
     pub fn is_linear(&self) -> bool {
-        self.0.iter().any(|step| matches!(step, Step::Linear(..)))
+        self.0.iter().any(|operation| matches!(operation, Operation::Linear(..)))
     }
 
     pub fn apply(&self, value: f64) -> f64 {
-        self.0.iter().fold(value, |value, step| match step {
-            Step::Linear(factor, offset) => factor * value + offset,
-            Step::Map { pairs, is_inverse: false } => {
+        self.0.iter().fold(value, |value, operation| match operation {
+            Operation::Linear(factor, offset) => factor * value + offset,
+            Operation::Map { pairs, is_inverse: false } => {
                 pairs.iter().find(|(from, _)| *from == value).map_or(value, |(_, to)| *to)
             }
-            Step::Map { pairs, is_inverse: true } => {
+            Operation::Map { pairs, is_inverse: true } => {
                 pairs.iter().find(|(_, to)| *to == value).map_or(value, |(from, _)| *from)
             }
         })
