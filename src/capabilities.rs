@@ -9,9 +9,9 @@ use crate::start::Start;
 use crate::testbed::{State, Testbed, split_by_side};
 use crate::variables::Name;
 use fmu_export::{
-    BaseType, Causality, CoSimulation, DefaultExperiment, Error, Experiment, FastSteps, Info,
-    InputDerivatives, Interface, Model, ModelExchange, OutputDerivatives, Partials, Saved, Setup,
-    StateVisitor, Step, Stepped, Variables, info, saved,
+    CoSimulation, DefaultExperiment, Error, Experiment, FastSteps, Info, InputDerivatives, Interface, Model,
+    ModelExchange, OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped, Variables, info,
+    saved,
 };
 use std::borrow::Cow;
 
@@ -144,23 +144,6 @@ const POSITIONS: [usize; TestbedFmu::NAMES.len()] = {
     positions
 };
 
-/// Compilation fails if the table contains a Real input, output or local variable whose derivatives are not defined.
-const _: () = {
-    let mut line = 0;
-    while line < TestbedFmu::TABLE.len() {
-        let variable = &TestbedFmu::TABLE[line];
-        let has_derivatives = matches!(variable.base(), BaseType::Real)
-            && matches!(variable.causality(), Causality::Input | Causality::Output | Causality::Local);
-        if has_derivatives && POSITIONS[line] == MOVING.len() {
-            fmu_export::reject(
-                variable.name(),
-                "it has no derivatives; add its name to moving_variables! in fmu.rs",
-            );
-        }
-        line += 1;
-    }
-};
-
 impl InputDerivatives for TestbedFmu {
     /// Accepts order 1 of theta, the slope over the next step. Higher orders and derivatives of omega are
     /// ignored, because the motor angles change linearly between communication points.
@@ -176,7 +159,7 @@ impl InputDerivatives for TestbedFmu {
 impl OutputDerivatives for TestbedFmu {
     fn output_derivative(&self, of: Name, _: u32) -> f64 {
         let rates = self.moving(&self.now().rates(self.system()));
-        change(of, &rates.into()).unwrap_or(f64::NAN)
+        self.change(of, &rates.into(), None).unwrap_or(f64::NAN)
     }
 }
 
@@ -197,18 +180,19 @@ impl Partials for TestbedFmu {
     ) -> impl Fn((Name, usize)) -> Option<f64> {
         let known = known.map(|(known, _)| known);
         let sensitivities = self.sensitivities(known);
-        move |(unknown, _)| change(unknown, &sensitivities)
+        move |(unknown, _)| self.change(unknown, &sensitivities, known)
     }
 }
 
-/// Returns the change of a variable if the [`Moving`](crate::fmu::Moving) variables change by `row`, because a known is set or because
-/// time passes.
-#[inline(always)]
-fn change(of: Name, row: &Row) -> Option<f64> {
-    row.get(POSITIONS[of as usize]).copied()
-}
-
 impl TestbedFmu {
+    /// Returns the change of a variable if the [`Moving`] variables change by `row`, because a known is set or because time passes (`None`).
+    /// A variable that is not linear, such as a power, needs an arm: the sum of each factor times the change of the other one. The factors
+    /// are the values after the known was set, because a motor angle that is set is a new sample, and may change the estimated rate.
+    #[inline(always)]
+    fn change(&self, of: Name, row: &Row, _known: Option<Name>) -> Option<f64> {
+        row.get(POSITIONS[of as usize]).copied()
+    }
+
     /// Returns the partial derivatives of the variables with respect to a known. `None` stands for time, on
     /// which no variable depends explicitly.
     #[inline(never)]

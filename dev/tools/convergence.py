@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from prw.columns import CHANNELS
 from prw.motion import Array, Motion
 from prw.state_space import StateSpace
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import Testbed
 
 #: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad, with frequencies of 2.2 and 3.7 Hz. (RATE is in rad/s.)
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
@@ -49,13 +50,13 @@ class Convergence(NamedTuple):
 
 def convergence(fmu: Path, model: StateSpace) -> Convergence:
     """Errors of the FMU for ever smaller steps, compared with the exact response of its linear model `model` or, for piecewise
-    linear motion, with a run of finer steps. The model must have the outputs OUTPUTS."""
+    linear motion, with a run of finer steps. The model must have the outputs CHANNELS."""
     errors = [
         (_error(fmu, model, n, False), _error(fmu, model, n, True), _piecewise_linear_error(fmu, n))
         for n in STEPS_PER_SECOND
     ]
     angles, rates, piecewise_linear = (
-        {name: np.array([e[way][name] for e in errors]) for name in OUTPUTS} for way in range(3)
+        {name: np.array([e[way][name] for e in errors]) for name in CHANNELS} for way in range(3)
     )
     return Convergence(1 / np.array(STEPS_PER_SECOND, dtype=float), angles, rates, piecewise_linear)
 
@@ -115,4 +116,4 @@ def _piecewise_linear_error(fmu: Path, n: int) -> dict[str, float]:
 
 
 def _largest(found: Mapping[str, Array], true: Mapping[str, Array], late: np.ndarray) -> dict[str, float]:
-    return {name: float(np.abs(found[name] - true[name])[late].max() / np.abs(true[name]).max()) for name in OUTPUTS}
+    return {name: float(np.abs(found[name] - true[name])[late].max() / np.abs(true[name]).max()) for name in CHANNELS}

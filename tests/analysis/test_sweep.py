@@ -17,12 +17,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from lagrange import OUTPUTS
 from scipy.stats import norm, qmc
 
 import prw
 from prw.errors import Interrupted
 from prw.motion import fig4
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import Testbed
 
 
 def rows(directory):

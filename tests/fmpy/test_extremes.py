@@ -28,6 +28,27 @@ def larger_of_pair(values):
     return np.repeat(pairs.max(axis=1), 2)
 
 
+class Size:
+    """A number that is calculated like a value, except that every term is added with its magnitude."""
+
+    def __init__(self, value):
+        self.value = abs(value)
+
+    def __add__(self, other):
+        return Size(self.value + other.value)
+
+    def __mul__(self, factor):
+        return Size(self.value * abs(factor.value if isinstance(factor, Size) else factor))
+
+    def __truediv__(self, divisor):
+        return Size(self.value / abs(divisor))
+
+    __sub__, __rmul__ = __add__, __mul__
+
+
+sized = np.vectorize(Size, otypes=[object])
+
+
 class Exact:
     """Exact step of one testbed with one step size. The matrix exponential has enough digits for all parameters."""
 
@@ -56,14 +77,9 @@ class Exact:
         size = larger_of_pair(size)
         theta = theta + slope * self.h
         outputs = model.outputs(end, theta, slope)
-        ratio = model.parameters["N"] / (2 * model.parameters["M"])
-        torque = larger_of_pair(abs(model.c) @ size + abs(model.d_angle) @ abs(theta) + abs(model.d_rate) @ abs(slope))
-        sizes = {
-            "tau1": torque[0], "tau2": torque[0],
-            "pitch": size[2], "roll": 2 * ratio * size[2], "pitch_rate": size[4], "roll_rate": 2 * ratio * size[4],
-            "theta3": size[0], "theta4": size[0],
-        }  # fmt: skip
-        return np.concatenate([end, [outputs[n] for n in OUTPUTS]]), np.concatenate([size, [sizes[n] for n in OUTPUTS]])
+        sizes = model.outputs(*(sized(larger_of_pair(abs(values))) for values in (size, theta, slope)))
+        sizes = [sizes[name].value for name in OUTPUTS]
+        return np.concatenate([end, [outputs[name] for name in OUTPUTS]]), np.concatenate([size, sizes])
 
 
 def check(instance, parameters, h, seed, steps=3):

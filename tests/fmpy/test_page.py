@@ -16,6 +16,7 @@ import pytest
 from built import ROOT, built, script_of, text_of
 from fmpy import read_model_description
 from fmu_run import Fmu
+from lagrange import OUTPUTS
 from test_references import NAMES
 from wasmtime import Engine, FuncType, Linker, Module, Store, ValType
 
@@ -24,7 +25,6 @@ from prw.checking.experiments import read_experiments
 PAGE = "documentation/index.html"
 GUID = re.compile(rb' guid="(\{[-0-9a-f]+\})"')
 PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
-OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
 
 
 def page_of(fmu: Path) -> str:

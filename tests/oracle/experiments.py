@@ -9,22 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 from controlled import MOTORS, Law, control
-from lagrange import OUTPUTS, REAL, linear_model, table_1, varied
+from lagrange import OUTPUTS, REAL, UNITS, linear_model, table_1, varied
 from reference import follow, integrate
 
-#: Tolerances of angles, rates and torques, as fractions of the largest value of the variables of the same kind. In
-#: Co-Simulation, torques have wider tolerances unless the motors turn at constant rates, because many importers read the
-#: torques before they set the next rates of the motors. So the torques of these importers lag one step.
+#: The outputs by their unit, in the order of the tolerances below.
+GROUPS = [
+    [name for name in OUTPUTS if UNITS[name] == unit]
+    for unit in dict.fromkeys(("rad", "rad/s", "N.m", *UNITS.values()))
+]
+#: Tolerances of angles, rates and torques, as fractions of the largest value of all outputs with the same unit. Outputs with another
+#: unit, such as a power, have the largest of the three. In Co-Simulation, torques have wider tolerances unless the motors turn at
+#: constant rates, because many importers read the torques before they set the next rates of the motors. So the torques of these
+#: importers lag one step.
 RelativeTolerances = Mapping[str, tuple[float, float, float]]
 STEP_SIZES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
 FAST_MOTION: RelativeTolerances = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
 SLOW_MOTION: RelativeTolerances = {"CoSimulation": (1e-4, 3e-4, 2e-2), "ModelExchange": (1e-4, 3e-4, 2e-3)}
 EXACT: RelativeTolerances = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5,) * 3}
-TOLERANCE_GROUPS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
 #: Interval in s between rows of the reference, and between samples of motors that do not turn at constant rates.
 INTERVAL, SAMPLE_TIME = 0.01, 1e-3
 #: Duration in s of all experiments except rate_step, and of the move from point to point.
@@ -49,9 +55,9 @@ class Experiment:
     tolerances: RelativeTolerances = field(default_factory=lambda: FAST_MOTION)
 
     def allowed(self, interface: str) -> dict[str, float]:
-        """Returns the tolerance of each output in rad, rad/s or N.m."""
-        found = {}
-        for names, fraction in zip(TOLERANCE_GROUPS, self.tolerances[interface]):
+        """Returns the tolerance of each output in its unit."""
+        found, fractions = {}, self.tolerances[interface]
+        for names, fraction in zip_longest(GROUPS, fractions, fillvalue=max(fractions)):
             largest = max(np.abs(self.reference[name]).max() for name in names)
             found.update(dict.fromkeys(names, float(f"{fraction * largest:.3g}")))
         return {name: found[name] for name in OUTPUTS}

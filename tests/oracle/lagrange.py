@@ -11,7 +11,9 @@ Sec. 4), and the last spring of eq. (6) is k2 (K of eq. 8). c and k of Table 1 a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -134,11 +136,29 @@ class LinearModel:
         tau = self.c @ x + self.d_angle @ theta + self.d_rate @ rate
         pitch, roll = pitch_roll(x[2], x[3], self.parameters)
         pitch_rate, roll_rate = pitch_roll(x[4], x[5], self.parameters)
-        values = (tau[0], tau[1], pitch, roll, pitch_rate, roll_rate, x[0], x[1])
-        return dict(zip(OUTPUTS, values, strict=True))
+        return {
+            "tau1": tau[0],
+            "tau2": tau[1],
+            "pitch": pitch,
+            "roll": roll,
+            "pitch_rate": pitch_rate,
+            "roll_rate": roll_rate,
+            "theta3": x[0],
+            "theta4": x[1],
+        }
 
 
-OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
+def described_outputs() -> dict[str, str]:
+    """Returns the unit of each output in the model description."""
+    root = ElementTree.parse(Path(__file__).parents[2] / "modelDescription" / "modelDescription.xml").getroot()
+    units = {each.get("name"): each[0].get("unit", "") for each in root.iter("SimpleType")}
+    listed = [each for each in root.iter("ScalarVariable") if each.get("causality") == "output"]
+    return {each.get("name", ""): units[each[0].get("declaredType")] for each in listed}
+
+
+#: The outputs of the FMU in the order of its description, and their units.
+UNITS = described_outputs()
+OUTPUTS = tuple(UNITS)
 
 
 def linear_model(p) -> LinearModel:

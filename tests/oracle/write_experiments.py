@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from experiments import SAMPLE_TIME, STEP_SIZES, TOLERANCE_GROUPS, Experiment, experiments
+from experiments import GROUPS, SAMPLE_TIME, STEP_SIZES, Experiment, experiments
 from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -115,7 +115,7 @@ def manifest(found: list[Experiment]) -> str:
 def about(found: list[Experiment]) -> str:
     """Returns the content of documentation/fmi-ls-ref.txt."""
     listed = "\n".join(f"  {e.name:<17} {e.description}" for e in found)
-    kinds = ", ".join(" ".join(names) for names in TOLERANCE_GROUPS)
+    kinds = ", ".join(" ".join(names) for names in GROUPS)
     return f"""Reference experiments
 
 The folder extra/{LAYER} contains experiments to test an importer. A program that shares no code with

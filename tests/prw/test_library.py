@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from built import ROOT
-from lagrange import linear_model, table_1
+from lagrange import OUTPUTS, linear_model, table_1
 from reference import follow
 
 import prw
@@ -57,7 +57,7 @@ def test_the_default_is_fig4(testbed: Path) -> None:
     run = prw.simulate(fmu=testbed)
     motion = prw.motion.fig4()
     expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, motion.omega)
-    assert list(run) == ["tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4"]
+    assert tuple(run) == OUTPUTS
     assert run.time.shape == run["roll"].shape == (2001,) and run.motion.name == "fig4"
     for name in ("roll", "tau1"):
         np.testing.assert_allclose(run[name], expected[name], atol=1e-11 * np.abs(expected[name]).max())
@@ -264,7 +264,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"parameters": {"k1": ([[1.0], [1.0, 2.0]], "N.m/deg")}}, r"k1 is \(\[\[1.0\], .* write finite numbers"),
         ({"parameters": {"k1": None}}, "k1 is None, not a number"),
         ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
-        ({"outputs": None}, "outputs: None is neither a name nor a sequence of names"),
+        ({"outputs": 5}, "outputs: 5 is neither a name nor a sequence of names"),
         ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU$"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:

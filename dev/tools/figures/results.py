@@ -12,7 +12,7 @@ import numpy as np
 from prw.linearization import linearize
 from prw.motion import Motion, fig4
 from prw.state_space import StateSpace
-from prw.testbed import ANGLE_OF, OUTPUTS, Testbed
+from prw.testbed import ANGLE_OF, Testbed
 from tools.convergence import Convergence, convergence, order
 from tools.frequency import SHAFTS, TORQUES, decibels, sweep
 from tools.modes import Mode, pitch_and_roll
@@ -80,7 +80,7 @@ def results(fmu: Path) -> Results:
 
 def _run(fmu: Path, motion: Motion) -> Run:
     with Testbed(fmu) as testbed:
-        return motion, testbed.respond(motion, ("theta5", "theta6", *OUTPUTS))
+        return motion, testbed.respond(motion, ("theta5", "theta6", *testbed.loaded.outputs))
 
 
 def _step(fmu: Path, sides: tuple[int, int]) -> Step:

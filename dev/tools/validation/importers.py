@@ -15,7 +15,7 @@ from prw.checking.experiments import Experiment, Value
 from prw.checking.result import Result
 from prw.columns import ANGLES, RATES
 from prw.motion import Array, Motion
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import Testbed
 
 #: Relative tolerance of the solver in Model Exchange.
 SOLVER_TOLERANCE = 1e-7
@@ -51,11 +51,16 @@ class Tool:
             return None
 
 
+def outputs_of(experiment: Experiment) -> tuple[str, ...]:
+    """The names of the outputs in the reference."""
+    return tuple(name for name in experiment.reference if name != "time")
+
+
 def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
     """FMPy's simulate_fmu in Co-Simulation; it reads outputs before it sets the next inputs."""
     from fmpy import simulate_fmu
 
-    step = experiment.step["CoSimulation"]
+    step, outputs = experiment.step["CoSimulation"], outputs_of(experiment)
     table = np.zeros(len(experiment.inputs["time"]), dtype=[(name, np.float64) for name in experiment.inputs])
     for name, values in experiment.inputs.items():
         table[name] = values
@@ -67,9 +72,9 @@ def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) 
         output_interval=step,
         input=table,
         start_values={**parameters, **{name: float(table[name][0]) for name in ANGLES}},
-        output=list(OUTPUTS),
+        output=list(outputs),
     )
-    return Result(fmu, np.asarray(rows["time"], dtype=np.float64), {name: np.asarray(rows[name]) for name in OUTPUTS})
+    return Result(fmu, np.asarray(rows["time"], dtype=np.float64), {name: np.asarray(rows[name]) for name in outputs})
 
 
 def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
@@ -78,6 +83,7 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
     from scipy.integrate import solve_ivp
 
     table, time, motors = experiment.inputs, experiment.reference["time"], (*ANGLES, *RATES)
+    outputs = outputs_of(experiment)
     with Fmu(fmu) as loaded:
         first = {name: float(table[name][0]) for name in motors}
         instance = loaded.instances(interface="model-exchange", start={**parameters, **first})
@@ -96,8 +102,8 @@ def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value])
         rows = []
         for t, state in zip(time, solved.y.T):
             right_hand_side(t, state)
-            rows.append(instance.get(OUTPUTS)[0])
-    return Result(fmu, time, dict(zip(OUTPUTS, np.array(rows).T)))
+            rows.append(instance.get(outputs)[0])
+    return Result(fmu, time, dict(zip(outputs, np.array(rows).T)))
 
 
 def by_fmu_run(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
@@ -109,7 +115,7 @@ def by_fmu_run(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value
         np.column_stack([np.interp(time, table["time"], table[name]) for name in names]) for names in (ANGLES, RATES)
     )
     with Testbed(fmu) as testbed:
-        found = testbed.respond(Motion(time, theta, omega), OUTPUTS, parameters)
+        found = testbed.respond(Motion(time, theta, omega), outputs_of(experiment), parameters)
     return Result(fmu, time, found)
 
 

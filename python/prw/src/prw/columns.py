@@ -59,6 +59,8 @@ MEASURED: dict[str, Channel] = {
     "pitch_rate": Channel("rate", 1e-2),
     "roll_rate": Channel("rate", 1e-2),
 }
+#: The outputs that can be measured.
+CHANNELS = tuple(MEASURED)
 MOTORS = {"theta1": "angle", "theta2": "angle", "omega1": "rate", "omega2": "rate"}
 #: The quantity of every column that is understood.
 QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, channel in MEASURED.items()}}

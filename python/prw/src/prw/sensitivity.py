@@ -14,7 +14,7 @@ from prw.errors import UserError
 from prw.motion import Motion
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.testbed import OUTPUTS, Testbed, driven_by
+from prw.testbed import Testbed, driven_by
 
 
 def sensitivities(
@@ -22,7 +22,7 @@ def sensitivities(
     parameters: str | Iterable[str] | None = None,
     *,
     values: Given = None,
-    outputs: str | Sequence[str] = OUTPUTS,
+    outputs: str | Sequence[str] | None = None,
     steps: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> fmu_run.Sensitivities:
@@ -40,7 +40,7 @@ def sensitivities(
     values
         Values of parameters at which to differentiate, as `parameters` for `prw.simulate`.
     outputs
-        Names of any Real variables.
+        Names of any Real variables. Default: all outputs.
     steps
         The largest step of a parameter by name, as for `fmu_run.Fmu.sensitivities`. A parameter that is 0 needs one.
     fmu
@@ -57,8 +57,9 @@ def sensitivities(
     UserError
         A name is unknown, a parameter is at the end of its range or is 0 and has no step, or the FMU rejects a value.
     """
-    moved, names = motion_of(motion), names_of("outputs", outputs)
+    moved = motion_of(motion)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
+        names = testbed.loaded.outputs if outputs is None else names_of("outputs", outputs)
         given = values_of(values, testbed.loaded)
         testbed.with_starts(given)
         starts: dict[str, Any] = {**testbed.starts, **given}

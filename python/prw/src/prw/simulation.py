@@ -18,7 +18,7 @@ from prw.errors import need
 from prw.files import write_table
 from prw.motion import Array, Motion, fig4
 from prw.recording import Recording, read, read_motion
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import Testbed
 
 #: Sampling error, as a fraction of the peak, above which there is a warning.
 DOUBTFUL = 0.01
@@ -164,7 +164,7 @@ def simulate(
     parameters: Given = None,
     *,
     fmu: str | os.PathLike[str] | None = None,
-    outputs: Sequence[str] = OUTPUTS,
+    outputs: Sequence[str] | None = None,
 ) -> Run:
     """Simulate the testbed with moving motors, from rest at their first angles.
 
@@ -180,7 +180,7 @@ def simulate(
     fmu
         The testbed FMU, of FMI 2.0 or 3.0. Default: see `default_fmu`.
     outputs
-        Names of any Real variables.
+        Names of any Real variables. Default: all outputs.
 
     Returns
     -------
@@ -200,8 +200,8 @@ def simulate(
     if motion is not None and not isinstance(motion, (Motion, Recording, Run)):
         motion = read(motion)
     moved = motion_of(motion)
-    names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
+        names = testbed.loaded.outputs if outputs is None else names_of("outputs", outputs)
         given = values_of(parameters, testbed.loaded)
         values = testbed.with_starts(given)
         check_names("outputs", names, testbed.loaded.variables)

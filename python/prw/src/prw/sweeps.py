@@ -21,7 +21,7 @@ from prw.parts import Parts, digest, part_size, record_in, versions
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.testbed import CONTINUOUS, OUTPUTS, Testbed, existing_fmu
+from prw.testbed import CONTINUOUS, Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
@@ -162,7 +162,7 @@ def _request(
     trajectories: int | None,
     testbed: Testbed,
 ) -> Request:
-    names = OUTPUTS if outputs is None else names_of("outputs", outputs)
+    names = testbed.loaded.outputs if outputs is None else names_of("outputs", outputs)
     chosen = STATISTICS if statistics is None else names_of("statistics", statistics)
     known = testbed.loaded.variables
     check_names("outputs", names, [name for name in known if known[name].type in CONTINUOUS])

@@ -12,12 +12,11 @@ import fmu_run
 import numpy as np
 
 from prw.arguments import check_names
-from prw.columns import ANGLES, RATES
+from prw.columns import ANGLES, CHANNELS, RATES
 from prw.errors import UserError, of_fmu
 from prw.files import CLONE, PACKAGE
 from prw.motion import Array, Motion
 
-OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
 #: The angle of each rate, see `StateSpace.transfer`.
 ANGLE_OF = dict(zip(RATES, ANGLES))
 
@@ -79,7 +78,7 @@ class Testbed:
         """Unpack and load the FMU file `fmu` (default: see `default_fmu`)."""
         self.fmu = fmu = existing_fmu(fmu)
         self.loaded = loaded(fmu)
-        missing = [name for name in (*ANGLES, "use_omega", *OUTPUTS) if name not in self.loaded.variables]
+        missing = [name for name in (*ANGLES, "use_omega", *CHANNELS) if name not in self.loaded.variables]
         if missing:
             self.close()
             raise UserError(f"{fmu}: not the testbed FMU for Co-Simulation (it lacks {', '.join(missing)})")
@@ -118,17 +117,18 @@ class Testbed:
         return {**known, **parameters}
 
     def respond(
-        self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
+        self, motion: Motion, outputs: Sequence[str] | None = None, start: Mapping[str, float] = {}
     ) -> dict[str, Array]:
         """Response to `motion` with the start values `start` (parameters by name, in the FMU's units), by default from rest at
         the first angles; each sample is one communication point.
 
-        Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
+        Returns `outputs` (any Real variables; by default all outputs) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
         read at time[k], after the motors' angles (and rates, if the motion has them) of sample k were set, so all
         values of a row belong to the same instant. Raises UserError if the FMU rejects a value or the run fails.
         """
         try:
-            runs = self.loaded.run(motion.time, outputs=outputs, **driven_by(motion, start))
+            names = self.loaded.outputs if outputs is None else outputs
+            runs = self.loaded.run(motion.time, outputs=names, **driven_by(motion, start))
         except ValueError as error:
             raise UserError(str(error)) from None
         if runs.errors:

@@ -21,7 +21,6 @@ from prw.motion import Array, fig4
 from prw.parts import TABLE, TRAJECTORIES
 from prw.recording import read_motion
 from prw.sweeps import STATISTICS, repeated, sweep
-from prw.testbed import OUTPUTS
 
 HELP = "run the FMU with many sets of parameters"
 EXAMPLES = """\
@@ -85,9 +84,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=SAMPLINGS[0],
         help="Latin hypercube or Sobol points cover the distribution more evenly (default: %(default)s)",
     )
-    parser.add_argument(
-        "--outputs", type=listed, metavar="NAMES", help=f"separated by commas (default: {','.join(OUTPUTS)})"
-    )
+    parser.add_argument("--outputs", type=listed, metavar="NAMES", help="separated by commas (default: all)")
     parser.add_argument(
         "--statistics",
         type=listed,

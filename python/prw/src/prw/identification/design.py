@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prw.columns import MEASURED
+from prw.columns import CHANNELS, MEASURED
 from prw.identification.experiment import Experiment, planned
 from prw.identification.fit import Fitter, Solution, Task
 from prw.identification.model import Model
 from prw.identification.statistics import UNDETERMINED, condition, covariance_of, information_of, noise_corrected
 from prw.motion import Array, Motion
-from prw.testbed import ANGLE_OF, OUTPUTS
+from prw.testbed import ANGLE_OF
 
 #: Seconds in which a motion fades in and out.
 FADE = 0.5
@@ -166,7 +166,7 @@ def _optimal(
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
     response = np.array([model.at(task.values(logarithms + s)).response_at_hz(frequency, ANGLE_OF) for s in steps])
     slopes = (response[: len(logarithms)] - response[len(logarithms) :]) / (2 * share)
-    rows = [OUTPUTS.index(name) for name in noise]
+    rows = [CHANNELS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]
     directions = np.array([[1.0, 1.0], [1.0, -1.0]])
     visible = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)

@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from prw.columns import CHANNELS
 from prw.identification.experiment import Experiment, spectra
 from prw.identification.response import Distortion, Response
 from prw.motion import Array
 from prw.state_space import Complex, StateSpace
-from prw.testbed import OUTPUTS
 
 #: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
 TURNING = 0.02
@@ -44,7 +44,7 @@ class Law(NamedTuple):
     drive
         (6, m), rates of the states per unit of the effect at m places.
     direct
-        (8, m), change of OUTPUTS per unit.
+        (8, m), change of CHANNELS per unit.
     follows
         (q, 6) and (q, 4), the signals that the effect follows, from the states and from the motors' angles and rates.
     of
@@ -68,11 +68,11 @@ def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) 
     kind, place = distortion
     rates, none = np.eye(6)[4:], np.zeros((2, 4))
     if kind == "friction" and not place.startswith("motor"):
-        turns = model.C[[OUTPUTS.index("pitch_rate"), OUTPUTS.index("roll_rate")]][:, 4:]
+        turns = model.C[[CHANNELS.index("pitch_rate"), CHANNELS.index("roll_rate")]][:, 4:]
         inertia = values["J2"] * np.eye(2) + turns.T @ np.diag([values["H3"], values["J3"]]) @ turns
         braked = {"shafts": np.eye(2), "shaft1": np.eye(2)[:1], "shaft2": np.eye(2)[1:], "output": turns}[place]
         drive = rates.T @ np.linalg.solve(inertia, braked.T)
-        return Law(drive, np.zeros((len(OUTPUTS), len(braked))), (braked @ rates, none[: len(braked)]))
+        return Law(drive, np.zeros((len(CHANNELS), len(braked))), (braked @ rates, none[: len(braked)]))
     if place not in ("k1", "k2"):
         return None
     if place == "k1":
@@ -80,7 +80,7 @@ def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) 
         rate = -model.A[:2], np.eye(2, 4, 2) - model.B[:2]
     else:
         # Angles 5 and 6 occur in the equations of motion and of the torques only as the ends of the springs k2.
-        direct = np.where(np.char.startswith(OUTPUTS, "tau")[:, None], -model.C[:, 2:4], 0.0)
+        direct = np.where(np.char.startswith(CHANNELS, "tau")[:, None], -model.C[:, 2:4], 0.0)
         drive, twist = -model.A[:, 2:4], (np.eye(6)[:2] - np.eye(6)[2:4], none)
         rate = model.A[:2] - np.eye(6)[4:], model.B[:2]
     if kind == "cubic":
@@ -166,7 +166,7 @@ def columns(
     contributions: dict[Distortion, Complex] = {}
     constant: Complex = np.zeros_like(response.outputs)
     motors = np.hstack([experiment.theta, experiment.omega])
-    rows = [OUTPUTS.index(name) for name in experiment.channels]
+    rows = [CHANNELS.index(name) for name in experiment.channels]
     for d in wanted:
         if d not in laws:
             contributions[d] = _of_sensors(d, experiment, response, initial, sizes)

@@ -10,8 +10,9 @@ from xml.etree import ElementTree
 
 import fmu_run
 
+from prw.columns import CHANNELS
 from prw.linearization import Linearizer
-from prw.testbed import CONTINUOUS, OUTPUTS
+from prw.testbed import CONTINUOUS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -107,12 +108,12 @@ class Parameters:
 
 
 class Model(Linearizer):
-    """The FMU's linear model, eq. (11), as a function of its parameters: `at(values)`, with the outputs OUTPUTS.
+    """The FMU's linear model, eq. (11), as a function of its parameters: `at(values)`, with the outputs that can be measured.
 
     known: the FMU's parameters. Raises UserError if the FMU is missing, is not the testbed, or rejects a value.
     """
 
     def __init__(self, fmu: str | os.PathLike[str] | None = None):
         """Load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
-        super().__init__(fmu, outputs=OUTPUTS)
+        super().__init__(fmu, outputs=CHANNELS)
         self.known = Parameters(self.loaded)

@@ -19,11 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from prw.columns import CHANNELS
 from prw.identification.experiment import Experiment
 from prw.identification.kinds import FILTERS, KINDS
 from prw.motion import Array
 from prw.state_space import Complex, StateSpace
-from prw.testbed import OUTPUTS
 
 #: Bounds of a distortion in units of its scale.
 FURTHEST = 50.0
@@ -73,7 +73,7 @@ class Discrete(NamedTuple):
 def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool) -> Discrete:
     """Discretize m models for the outputs `channels` and steps of `step` s. simulated: whether the motors move as in a
     simulation of the FMU in Co-Simulation, instead of along cubics."""
-    rows = [OUTPUTS.index(name) for name in channels]
+    rows = [CHANNELS.index(name) for name in channels]
     A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
     angle, rate, C, D = B[..., :2], B[..., 2:], C[..., rows, :], D[..., rows, :]
     # The state, and the motors' angles with three derivatives, in units of the step.
