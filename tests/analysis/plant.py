@@ -63,6 +63,12 @@ class Case(NamedTuple):
         Factors of J2, J3 and H3, which the parameters of the rig do not contain, as if the drawing were wrong.
     softening
         Fraction by which k1 falls in the middle of the recording.
+    falling
+        Fraction by which k2 falls evenly during the recording.
+    sides
+        Factors from k1, k2, c1 and c2 to the values of side 2.
+    viscous
+        N.m.s/rad, of the two input shafts and of the two shafts between the couplings.
     """
 
     seed: int
@@ -73,6 +79,9 @@ class Case(NamedTuple):
     cubic: tuple[float, float] = (0.0, 0.0)
     inertia: tuple[float, float, float] = (1.0, 1.0, 1.0)
     softening: float = 0.0
+    falling: float = 0.0
+    sides: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    viscous: tuple[float, float] = (0.0, 0.0)
 
 
 def drives(random: np.random.Generator, motion: str, reach: float = 0.5) -> np.ndarray:
@@ -110,7 +119,10 @@ def experiments(cases: Sequence[Case], duration: float = 8.0, rate: float = 1000
     turning, amplitudes = 2j * np.pi * moved[0].real, moved[1:]
     friction, play, cubic = (np.array([getattr(c, n) for c in cases]).T for n in ("friction", "play", "cubic"))
     j2, j3, h3 = np.array([c.inertia for c in cases]).T * np.array([[J2], [J3], [H3]])
-    output_friction, softening = np.array([(c.output_friction, c.softening) for c in cases]).T
+    output_friction, softening, falling = np.array([(c.output_friction, c.softening, c.falling) for c in cases]).T
+    slow, between = np.array([c.viscous for c in cases]).T
+    # (side, case)
+    k1, k2, c1, c2 = (np.stack([p, p * f]) for p, f in zip((k1, k2, c1, c2), np.array([c.sides for c in cases]).T))
 
     def motors(time: float) -> tuple[np.ndarray, np.ndarray]:
         waves = amplitudes * np.exp(turning * time)
@@ -122,15 +134,16 @@ def experiments(cases: Sequence[Case], duration: float = 8.0, rate: float = 1000
     def torques(time: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns the torques on the motors, and the torques and rates of the shafts between the couplings."""
         (angle, omega), soft = motors(time), 1 - softening * (time > duration / 2)
-        # These shafts have no inertia, so both couplings of a side transmit the same torque.
-        first, second = spring(k1 * soft, 0, angle - x[:2]), spring(k2, 1, x[:2] - x[2:4])
-        shaft_rate = (first + c1 * omega - second + c2 * x[4:]) / (c1 + c2)
+        # These shafts have no inertia, so both couplings of a side transmit the same torque, except for friction.
+        first = spring(k1 * soft, 0, angle - x[:2])
+        second = spring(k2 * (1 - falling * time / duration), 1, x[:2] - x[2:4])
+        shaft_rate = (first + c1 * omega - second + c2 * x[4:]) / (c1 + c2 + between)
         return -first - c1 * (omega - shaft_rate), second + c2 * (shaft_rate - x[4:]), shaft_rate
 
     def slope(time: float, flat: np.ndarray) -> np.ndarray:
         x = flat.reshape(6, -1)
         _, drive, shaft_rate = torques(time, x)
-        drive = drive - friction * np.tanh(x[4:] / KNEE)
+        drive = drive - friction * np.tanh(x[4:] / KNEE) - slow * x[4:]
         pitch_rate, roll_rate = (x[4] + x[5]) / 2, RATIO * (x[4] - x[5])
         pitching, rolling = (c3 * r + output_friction * np.tanh(r / KNEE) for r in (pitch_rate, roll_rate))
         # Each input shaft carries half of the pitch torque, plus or minus RATIO times the roll torque. So the sum of the two

@@ -10,6 +10,7 @@ from prw.identification import task_of
 from prw.identification.experiment import prepare
 from prw.identification.fit import Fitter
 from prw.identification.path import quantum_of, smooth
+from prw.identification.response import Distortion
 from prw.motion import Motion
 from prw.recording import Recording, read
 
@@ -55,17 +56,21 @@ def test_missing_and_uneven_rows_change_nothing(model, simulated):
 
 
 def test_derivatives_with_respect_to_the_parameters(model, simulated):
-    """The derivatives that the search uses agree with finite differences, also if angles are quantised."""
+    """The derivatives that the search uses agree with finite differences, also if angles are quantised, and for distortions that filter
+    a channel or change the model."""
     measured = read(rig.measure(simulated, 5, counts=2000))
-    task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model))
+    named = {"asymmetry": "c1", "delay": "tau1", "viscous": "between"}
+    distortions = tuple(Distortion(kind, place) for kind, place in named.items())
+    task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), distortions=distortions)
     noise = {"tau1": 0.02, "tau2": 0.02, "theta3": 1e-3, "theta4": 1e-3, "pitch": 1e-3, "roll": 1e-3}
     fitter, at = Fitter(model, [prepare(measured)], task, noise), task.first()
+    at[-3:] = 0.3, 0.01, 0.2
     found = fitter.slopes(at)
     step = 1e-5
     for i, direction in enumerate(np.eye(len(at))):
         differences = (fitter.residuals(at + step * direction) - fitter.residuals(at - step * direction)) / (2 * step)
         # Kaufman's approximation omits a term that is proportional to the residual.
-        assert np.linalg.norm(found[:, i] - differences) < 5e-3 * np.linalg.norm(differences), task.names[i]
+        assert np.linalg.norm(found[:, i] - differences) < 5e-3 * np.linalg.norm(differences), task.unknowns[i]
 
 
 def wave(t):

@@ -76,12 +76,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "lag": "lag, to first order",
         "gain": "read too much or too little",
         "drift": "drift slowly",
+        "fading": "lose gain during the recording",
     }
     places = {
         "friction": "places with dry friction (N.m)",
         "backlash": "springs with backlash (rad), or the motors",
         "clearance": "couplings that let go in a gap (rad)",
         "cubic": "springs with the torque k (twist + cubic twist^3), cubic in 1/rad2",
+        "asymmetry": "parameters that differ between the sides; the estimate is then the value of side 1",
+        "viscous": "places with viscous friction (N.m.s/rad)",
+        "softening": "springs that lose stiffness during the recording; the estimate is then the value at its beginning",
+        "turned": "inertial sensors that are turned from pitch towards roll",
         "crosstalk": "torques to which the other one adds a share",
     }
     effects = {
@@ -93,6 +98,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     }
     for kind, (metavar, explained) in effects.items():
         parser.add_argument(f"--{kind}", type=listed, default="", metavar=metavar, help=explained)
+    parser.add_argument(
+        "--follow",
+        type=int,
+        nargs="?",
+        const=3,
+        default=0,
+        metavar="STEPS",
+        help="follow the first cause that is found, step by step, at most %(const)s or STEPS times, and list what was assumed",
+    )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
     )

@@ -65,8 +65,14 @@ def identify(
     backlash: Sequence[str] = (),
     clearance: Sequence[str] = (),
     cubic: Sequence[str] = (),
+    asymmetry: Sequence[str] = (),
+    viscous: Sequence[str] = (),
+    softening: Sequence[str] = (),
+    turned: Sequence[str] = (),
+    fading: Sequence[str] = (),
     crosstalk: Sequence[str] = (),
     drift: Sequence[str] = (),
+    follow: int = 0,
     names: Mapping[str, str] = {},
     skip: int = 0,
     encoding: str = "",
@@ -111,8 +117,22 @@ def identify(
         lets go when its torque would pull.
     cubic
         Springs with the torque k (twist + cubic twist^3), cubic in 1/rad^2: "k1", "k2".
+    asymmetry
+        "k1", "k2", "c1", "c2": side 2 differs from side 1 by a fraction of the parameter, which is the value of side 1.
+    viscous
+        Where there is viscous friction (N.m.s/rad): "shafts" (equal in both input shafts), "between" (equal in both shafts between the
+        couplings).
+    softening
+        "k1", "k2": the stiffness decreases linearly by a fraction during each recording; the parameter is its value at the beginning.
+    turned
+        "imu": the inertial sensor is turned about the axis that is vertical to pitch and roll (rad).
+    fading
+        Channels whose gain decreases linearly from 1 by a fraction during each recording.
     crosstalk
         Torque channels to which the other torque adds a share: "tau1", "tau2", or "torques" (equal in both).
+    follow
+        Maximum number of steps in which the first cause of a misfit is assumed and the fit is repeated. A step is not taken if
+        several causes explain the data, or if the cause needs a correction of the recording. See `assumed` and `stopped`.
     fmu
         The testbed FMU (default: as for `prw.simulate`).
 
@@ -146,7 +166,7 @@ def identify(
     from prw.recording import Recording, read
     from prw.simulation import Run
 
-    starts = counted("starts", starts)
+    starts, follow = counted("starts", starts), counted("follow", follow) if follow else 0
     header: Any = {"names": names, "skip": skip, "encoding": encoding}
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
@@ -160,8 +180,14 @@ def identify(
         "backlash": backlash,
         "clearance": clearance,
         "cubic": cubic,
+        "asymmetry": asymmetry,
+        "viscous": viscous,
+        "softening": softening,
+        "turned": turned,
+        "fading": fading,
+        "crosstalk": crosstalk,
     }
-    requested = {kind: names_of(kind, given) for kind, given in {**places, "crosstalk": crosstalk}.items()}
+    requested = {kind: names_of(kind, given) for kind, given in places.items()}
     drift = names_of("drift", drift)
     # There are many small matrices, with which more threads would be slower.
     with Model(fmu) as model, threadpool_limits(1):
@@ -187,24 +213,33 @@ def identify(
         ]
         how = [(quantum, rate, rate != "motors") for rate in rates]
         experiments = [prepare(each, *more) for each, more in zip(measured, how)]
-        solution = fit(model, experiments, task, starts, seed)
-        verdict = judge(solution)
         # Recordings with very exact motor angles may be simulations of the FMU, in which the motors jump between steps. If the
         # model does not explain the data, these recordings are compared with the FMU's own steps.
         exact = [may_be_simulated(experiment) for experiment in experiments]
         ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
-        for way in ways:
-            if not verdict.fits:
-                again = [prepare(m, quantum, way) if x else e for m, x, e in zip(measured, exact, experiments)]
-                other = fit(model, again, task, starts, seed)
-                if (better := judge(other)).fits:
-                    experiments, solution, verdict = again, other, better
-        found = Explanation(solution, verdict, (), ()) if verdict.fits else explain(solution, verdict)
+        assumed: list[str] = []
+        while True:
+            solution = fit(model, experiments, task, starts, seed)
+            verdict = judge(solution)
+            for way in ways:
+                if not verdict.fits:
+                    again = [prepare(m, quantum, way) if x else e for m, x, e in zip(measured, exact, experiments)]
+                    other = fit(model, again, task, starts, seed)
+                    if (better := judge(other)).fits:
+                        experiments, solution, verdict = again, other, better
+            found = Explanation(solution, verdict, (), ()) if verdict.fits else explain(solution, verdict)
+            stopped = "" if found.verdict.fits or not follow else found.unclear
+            if found.verdict.fits or stopped or len(assumed) == follow:
+                break
+            assumed.append(found.causes[0].text)
+            task = found.causes[0].applied(task)
+        if follow and not found.verdict.fits and not stopped:
+            stopped = f"the limit of {follow} is reached"
         parts = [] if found.verdict.fits or found.known else over_time(model, measured, task, how)
         sure = certainty(found.solution, found.verdict.widening)
         hints = advice(model, experiments, found.solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)
-        judged = found, tuple(parts), tuple(hints)
+        judged = found, tuple(parts), tuple(hints), tuple(assumed), stopped
         return Identification(model.fmu, model.known, sources, tuple(experiments), found.solution, sure, *judged)
 
 

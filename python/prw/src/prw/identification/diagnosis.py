@@ -49,9 +49,9 @@ MOST, SECOND = 3, 0.01
 #: The hypothesis that the inertias differ from the drawing, and their standard deviation in the fit that frees them.
 INERTIAS, DRAWING = Hypothesis("inertias", ("J2", "J3", "H3")), 0.1
 TORQUES = ("tau1", "tau2")
-#: Numbers of parts in which a recording is fitted, and minimum number of rows of a part. A parameter changes if the difference exceeds
+#: Numbers of parts in which a recording is fitted, each with the number of parts that must fit; and minimum number of rows of a part. A parameter changes if the difference exceeds
 #: this number of standard errors.
-PARTS, SHORTEST, CHANGED = (2, 4), 1000, 6.0
+PARTS, SHORTEST, CHANGED = ((2, 2), (4, 3)), 1000, 6.0
 
 
 class Cause(NamedTuple):
@@ -78,6 +78,14 @@ class Cause(NamedTuple):
         remedy = f" (to estimate it, add {spelled(self.argument, self.value, command)})" if self.argument else ""
         return f"{self.text}{remedy}{'; ' if self.hint else ''}{self.hint}"
 
+    def applied(self, task: Task) -> Task:
+        """The task in which it is estimated, too."""
+        if self.argument == "priors":
+            return task.including(priors={name: Prior(task.start[name], x) for name, x in self.value.items()})
+        if self.argument == "drift":
+            return task.including(drift=tuple(self.value))
+        return task.including(tuple(Distortion(self.argument, place) for place in self.value))
+
 
 class Explanation(NamedTuple):
     """The result of a search for causes.
@@ -99,6 +107,15 @@ class Explanation(NamedTuple):
     causes: tuple[Cause, ...]
     tried: tuple[str, ...]
     known: bool = True
+
+    @property
+    def unclear(self) -> str:
+        """Why the first cause cannot be followed without a decision of the user; empty if it can."""
+        if not self.causes:
+            return "no cause was found"
+        if not self.causes[0].argument:
+            return "the recording has to be corrected first"
+        return next((f"several causes explain the data; {cause.hint}" for cause in self.causes if cause.hint), "")
 
 
 class _Trial(NamedTuple):
@@ -180,9 +197,9 @@ class Part(NamedTuple):
 
 
 def over_time(model: Model, recordings: Sequence[Recording], task: Task, how: Sequence[Any]) -> list[Part]:
-    """The fits of halves of the recordings, or else of quarters, if all parts fit and a parameter changes; else an empty list. how: the
-    further arguments of `prepare` for each recording."""
-    for count in PARTS:
+    """The fits of halves of the recordings, or else of quarters, if the parts fit and a parameter changes; else an empty list. A quarter
+    in which a parameter jumps does not fit and is left out. how: the further arguments of `prepare` for each recording."""
+    for count, least in PARTS:
         found = []
         for k in range(count):
             sections = [_section(each, k / count, (k + 1) / count) for each in recordings]
@@ -190,10 +207,11 @@ def over_time(model: Model, recordings: Sequence[Recording], task: Task, how: Se
                 return []
             solution = fit(model, [prepare(each, *more) for each, more in zip(sections, how)], task, 1)
             verdict = judge(solution)
-            if not verdict.fits:
+            if verdict.fits:
+                found.append(Part(k / count, (k + 1) / count, solution, certainty(solution, verdict.widening).relative))
+            elif k - len(found) >= count - least:
                 break
-            found.append(Part(k / count, (k + 1) / count, solution, certainty(solution, verdict.widening).relative))
-        if len(found) == count:
+        if len(found) >= least:
             return found if changes(found) else []
     return []
 
@@ -206,7 +224,9 @@ def changes(parts: Sequence[Part]) -> list[str]:
         low, high = min(values), max(values)
         if high[0] - low[0] > CHANGED * np.hypot(low[1], high[1]):
             each = ", ".join(" +- ".join(rounded(*value)) for value in values)
-            found.append(f"{name} changes over time ({each} in {len(parts)} parts of equal length)")
+            count = round(1 / (parts[0].end - parts[0].begin))
+            which = f"{count} parts" if len(parts) == count else f"{len(parts)} of {count} parts"
+            found.append(f"{name} changes over time ({each} in {which} of equal length)")
     return found
 
 
@@ -256,8 +276,7 @@ def _trials(solution: Solution, verdict: Verdict) -> list[_Trial]:
             found = _including(solution, hypothesis)
             unknowns = max(len(hypothesis.distortions), 3 if not hypothesis.distortions else 1)
             gain = solution.deviance - found.deviance - COST * unknowns
-            # Only friction and backlash of the right sign exist.
-            if not hypothesis.signs or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
+            if not hypothesis.positive or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
                 trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 else verdict))
     return sorted(trials, key=lambda trial: -trial.gain)
 

@@ -1,8 +1,9 @@
-"""Effects of real rigs that the FMU does not model: friction, backlash, clearance, cubic stiffness, and crosstalk of the torques.
+"""Effects of real rigs that the FMU does not model: friction, backlash, unequal sides, changes over time, and errors of sensors.
 
 The FMU is linear, so an effect adds its size times a pattern to the outputs. The pattern follows a law, for example the sign of a
 rate. It depends on the motion, and so weakly on the parameters and the sizes: the fit holds the patterns and repeats them at its
-result until both agree. Backlash, clearance and cubic stiffness of a coupling act like a shift of the angle at the spring's end.
+result until both agree. Backlash, clearance and other properties of a coupling act like a shift of the angle at the spring's end.
+If the law is linear and does not depend on time, as for unequal sides, the fit uses an exact linear model with the effect instead.
 
 With backlash, only the spring has play. With clearance, the whole coupling does, and it lets go when its torque would pull the sides
 apart: for a twist e above half of the clearance, the torque k (e - clearance / 2) + c e' is at least 0. The shift is then -e - c e' / k plus
@@ -12,6 +13,7 @@ the reaction of the massless shaft, so the part of the effect during which the c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -20,6 +22,7 @@ from scipy.linalg import expm
 
 from prw.columns import CHANNELS
 from prw.identification.experiment import Experiment, spectra
+from prw.identification.kinds import KINDS, LINEAR
 from prw.identification.response import Distortion, Response
 from prw.motion import Array
 from prw.state_space import Complex, StateSpace
@@ -46,13 +49,17 @@ class Law(NamedTuple):
     direct
         (8, m), change of CHANNELS per unit.
     follows
-        (q, 6) and (q, 4), the signals that the effect follows, from the states and from the motors' angles and rates.
+        (q, 6) and (q, 4), the signals that the effect follows, from the states and from the motors' angles and rates; (q, 5) if they
+        also depend on the time, which increases from 0 to 1 during the recording.
     of
         Effect (..., m) per unit of its size, from the signals (..., q) and the size. None for dry friction.
     once
         The same for the signals [q] of one instant, as a list [m], because numpy is slow for single numbers.
     fixed
         The part (..., m) of the effect that does not depend on its size, from the same arguments; None if there is none.
+    reacts
+        (q, 6), change of the signals with the rates of the states that the effect itself causes. Only for the kinds LINEAR, which are
+        their signals times their size.
     """
 
     drive: Array
@@ -61,28 +68,53 @@ class Law(NamedTuple):
     of: Callable[[Array, float], Array] | None = None
     once: Callable[[list[float], float], list[float]] | None = None
     fixed: Callable[[Array, float], Array] | None = None
+    reacts: Array | None = None
+
+    def signals(self, states: Array, motors: Array) -> Array:
+        """The signals (n, q). states: (n, 6). motors: see `_motors`."""
+        of_states, of_motors = self.follows
+        found: Array = states @ of_states.T + motors[:, : of_motors.shape[1]] @ of_motors.T
+        return found
 
 
 def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) -> Law | None:
     """The law of a mechanical effect, None for other distortions. values: parameters of the model in SI."""
     kind, place = distortion
     rates, none = np.eye(6)[4:], np.zeros((2, 4))
-    if kind == "friction" and not place.startswith("motor"):
+    if (kind == "friction" and not place.startswith("motor")) or (kind, place) == ("viscous", "shafts"):
         turns = model.C[[CHANNELS.index("pitch_rate"), CHANNELS.index("roll_rate")]][:, 4:]
         inertia = values["J2"] * np.eye(2) + turns.T @ np.diag([values["H3"], values["J3"]]) @ turns
         braked = {"shafts": np.eye(2), "shaft1": np.eye(2)[:1], "shaft2": np.eye(2)[1:], "output": turns}[place]
         drive = rates.T @ np.linalg.solve(inertia, braked.T)
-        return Law(drive, np.zeros((len(CHANNELS), len(braked))), (braked @ rates, none[: len(braked)]))
-    if place not in ("k1", "k2"):
+        signals, direct = (braked @ rates, none[: len(braked)]), np.zeros((len(CHANNELS), len(braked)))
+        if kind == "viscous":
+            return Law(drive, direct, (-signals[0], signals[1]), _same, reacts=np.zeros((len(braked), 6)))
+        return Law(drive, direct, signals)
+    if kind not in ("asymmetry", "backlash", "clearance", "cubic", "softening", "viscous") or place == "motors":
         return None
-    if place == "k1":
-        drive, direct, twist = model.B[:, :2], model.D[:, :2], (-np.eye(6)[:2], np.eye(2, 4))
+    shafts, first = np.eye(6)[:2], place in ("k1", "c1", "between")
+    if first:
+        drive, direct, twist = model.B[:, :2], model.D[:, :2], (-shafts, np.eye(2, 4))
         rate = -model.A[:2], np.eye(2, 4, 2) - model.B[:2]
     else:
         # Angles 5 and 6 occur in the equations of motion and of the torques only as the ends of the springs k2.
         direct = np.where(np.char.startswith(CHANNELS, "tau")[:, None], -model.C[:, 2:4], 0.0)
-        drive, twist = -model.A[:, 2:4], (np.eye(6)[:2] - np.eye(6)[2:4], none)
-        rate = model.A[:2] - np.eye(6)[4:], model.B[:2]
+        drive, twist = -model.A[:, 2:4], (shafts - np.eye(6)[2:4], none)
+        rate = model.A[:2] - rates, model.B[:2]
+    if kind == "viscous":
+        # A torque on these shafts moves them as a shift of the springs k1 does, but does not act on the motors.
+        own = np.array([[name == f"tau{i}" for i in (1, 2)] for name in CHANNELS], dtype=float)
+        turning = -model.A[:2], -model.B[:2]
+        return Law(drive / values["k1"], direct / values["k1"] + own, turning, _same, reacts=-shafts)
+    if kind == "asymmetry":
+        # Only side 2 differs. The torque of a damper is the torque of the spring beside it with another twist.
+        share, at = (1.0, twist) if place[0] == "k" else (values[place] / values[f"k{place[1]}"], rate)
+        reacts = share * (at is rate) * (-shafts if first else shafts)
+        return Law(drive[:, 1:], direct[:, 1:], (share * at[0][1:], share * at[1][1:]), _same, reacts=reacts[1:])
+    if kind == "softening":
+        with_time = np.zeros((3, 5))
+        with_time[:2, :4], with_time[2, 4] = twist[1], 1.0
+        return Law(drive, direct, (np.vstack([twist[0], np.zeros(6)]), with_time), _softer, _softer_once)
     if kind == "cubic":
         return Law(drive, direct, twist, _cubed, _cubed_once)
     if kind == "backlash":
@@ -92,6 +124,40 @@ def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) 
     opening = [reaction * (e + values[f"c{place[1]}"] / values[place] * de) for e, de in zip(twist, rate)]
     follows = np.vstack([twist[0], opening[0]]), np.vstack([twist[1], opening[1]])
     return Law(drive, direct, follows, _let_go, _let_go_once, _open)
+
+
+def including(model: StateSpace, values: Mapping[str, float], sizes: Mapping[Distortion, float]) -> StateSpace:
+    """The linear model with the effects of the kinds LINEAR among `sizes`."""
+    laws = [(found, size) for d, size in sizes.items() if d.kind in LINEAR and (found := law(d, model, values))]
+    if not laws:
+        return model
+    scale = np.concatenate([np.full((len(each.follows[0]), 1), size) for each, size in laws])
+    drive, direct = (np.hstack([getattr(each, name) for each, _ in laws]) for name in ("drive", "direct"))
+    follows = np.vstack([np.hstack(each.follows) for each, _ in laws])
+    reacts = np.vstack([each.reacts for each, _ in laws if each.reacts is not None])
+    gain = np.linalg.solve(np.eye(len(scale)) - scale * (reacts @ drive), scale * follows)
+    of_states, of_motors = gain[:, :6], gain[:, 6:]
+    return replace(
+        model,
+        A=model.A + drive @ of_states,
+        B=model.B + drive @ of_motors,
+        C=model.C + direct @ of_states,
+        D=model.D + direct @ of_motors,
+    )
+
+
+def _same(signals: Array, size: float) -> Array:
+    return signals
+
+
+def _softer(signals: Array, size: float) -> Array:
+    """Shift of a spring's end per unit of softening. signals: the twists, then the time from 0 to 1."""
+    found: Array = -signals[..., :-1] * signals[..., -1:]
+    return found
+
+
+def _softer_once(signals: list[float], size: float) -> list[float]:
+    return [-e * signals[-1] for e in signals[:-1]]
 
 
 def _free(twist: Array, size: float) -> Array:
@@ -161,17 +227,19 @@ def columns(
     count = len(experiment.time)
     states = np.fft.irfft(response.moving(initial), count, axis=0, norm="ortho")
     laws = {d: found for d in {**sizes, **dict.fromkeys(wanted)} if (found := law(d, model, values)) is not None}
-    present = {d: size for d, size in sizes.items() if d in laws and (size > 0 or (size and d.kind == "cubic"))}
+    present = {
+        d: size for d, size in sizes.items() if d in laws and (size > 0 or (size and not KINDS[d.kind].positive))
+    }
     moved, strengths = _moved(model.A * experiment.step, laws, present, states, experiment)
     contributions: dict[Distortion, Complex] = {}
     constant: Complex = np.zeros_like(response.outputs)
-    motors = np.hstack([experiment.theta, experiment.omega])
+    motors = _motors(experiment)
     rows = [CHANNELS.index(name) for name in experiment.channels]
     for d in wanted:
         if d not in laws:
             contributions[d] = _of_sensors(d, experiment, response, initial, sizes)
             continue
-        signals = moved @ laws[d].follows[0].T + motors @ laws[d].follows[1].T
+        signals = laws[d].signals(moved, motors)
         of, fixed, size = laws[d].of, laws[d].fixed, sizes.get(d, 0.0)
         at = -sign(signals) if of is None else of(signals, size)
         during = strengths[d] if d in strengths else _mean(at)
@@ -188,6 +256,11 @@ def columns(
     return contributions, constant
 
 
+def _motors(experiment: Experiment) -> Array:
+    """The motors' angles and rates, and the time from 0 to 1: (n, 5)."""
+    return np.hstack([experiment.theta, experiment.omega, np.linspace(0, 1, len(experiment.time))[:, None]])
+
+
 def _mean(values: Array) -> Array:
     """Mean of the values (n, m) at the beginning and the end of each step."""
     return (values + np.roll(values, -1, axis=0)) / 2
@@ -196,7 +269,7 @@ def _mean(values: Array) -> Array:
 def _of_sensors(
     d: Distortion, experiment: Experiment, response: Response, initial: Array, sizes: Mapping[Distortion, float]
 ) -> Complex:
-    """The contribution of friction or backlash at the motors, or of crosstalk, as in `columns`."""
+    """The contribution of friction or backlash at the motors, or of an error of sensors, as in `columns`."""
     outputs, channels = response.outputs + response.transients @ initial, experiment.channels
     column: Complex = np.zeros_like(outputs)
     turning = sign(experiment.omega)
@@ -204,12 +277,23 @@ def _of_sensors(
         size = sizes.get(d, 0.0)
         played = _played(experiment.theta, size) if size > 0 else -turning / 2
         return np.asarray((response.transfer @ spectra(played)[: len(outputs), :, None])[..., 0], dtype=complex)
-    for name, other, i in (("tau1", "tau2", 0), ("tau2", "tau1", 1)):
-        if d.kind == "friction" and d.channel == f"motor{i + 1}" and name in channels:
-            # A torque that drives the wrist is negative (eq. 9).
-            column[:, channels.index(name)] = -spectra(turning)[: len(outputs), i]
-        if d.kind == "crosstalk" and d.channel in (name, "torques") and {name, other} <= set(channels):
-            column[:, channels.index(name)] = outputs[:, channels.index(other)]
+    if d.kind == "friction" and f"tau{d.channel[-1]}" in channels:
+        # A torque that drives the wrist is negative (eq. 9).
+        column[:, channels.index(f"tau{d.channel[-1]}")] = -spectra(turning)[: len(outputs), int(d.channel[-1]) - 1]
+    if d.kind == "fading" and d.channel in channels:
+        time, i = _motors(experiment)[:, -1], channels.index(d.channel)
+        exact = np.fft.irfft(outputs[:, i], len(time), norm="ortho") / (1 - sizes.get(d, 0.0) * time)
+        column[:, i] = -spectra(time * exact)[: len(outputs)]
+    mixed = {"crosstalk": (("tau1", "tau2"),), "turned": (("pitch", "roll"), ("pitch_rate", "roll_rate"))}
+    for pair in mixed.get(d.kind, ()):
+        if set(pair) <= set(channels):
+            size, indices = sizes.get(d, 0.0), [channels.index(name) for name in pair]
+            # The change of both channels per unit of the effect, from the exact values. The outputs contain this change.
+            sine, cosine = np.sinc(size / np.pi), -size / 2 * np.sinc(size / 2 / np.pi) ** 2
+            shares = np.array([[cosine, sine], [-sine, cosine]]) if d.kind == "turned" else np.eye(2)[::-1].copy()
+            if d.channel in pair:
+                shares[pair.index(d.channel) - 1] = 0.0
+            column[:, indices] = outputs[:, indices] @ np.linalg.solve((np.eye(2) + size * shares).T, shares.T)
     return column
 
 
@@ -243,13 +327,13 @@ def _moved(
     (n, m). A: times the step. states: (n, 6) without effects."""
     if not sizes:
         return states, {}
-    motors, stepped = np.hstack([experiment.theta, experiment.omega]), _held(A, np.zeros((6, 0)))[0]
+    motors, stepped = _motors(experiment), _held(A, np.zeros((6, 0)))[0]
     towards, ends = np.vstack([np.eye(6), *(laws[d].follows[0] for d in sizes)]), [6]
     steps = []
     for d, size in sizes.items():
         ends.append(ends[-1] + len(laws[d].follows[0]))
         gain = towards @ (size * _held(A, laws[d].drive * experiment.step)[1])
-        signals = states @ laws[d].follows[0].T + motors @ laws[d].follows[1].T
+        signals = laws[d].signals(states, motors)
         part = slice(*ends[-2:])
         steps.append(
             (size, gain, gain[part], part, laws[d].once, signals.tolist(), np.zeros((len(states), gain.shape[1])))

@@ -114,6 +114,8 @@ class Findings:
     explanation: Explanation
     parts: tuple[Part, ...]
     advice: tuple[str, ...]
+    assumed: tuple[str, ...] = ()
+    stopped: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -143,7 +145,7 @@ class Findings:
         """The diagnosis, with remedies as options of the command if `command` is true, otherwise as arguments of Python."""
         if self.fits:
             return []
-        found = [f"{change}: with that, each part fits" for change in changes(self.parts)]
+        found = [f"{change}: with that, each of these parts fits" for change in changes(self.parts)]
         if not self.explanation.known:
             found += filter(None, map(note_on_times, self.experiments, self.solution.modelled))
         return found + [cause.message(command) for cause in self.explanation.causes]
@@ -229,6 +231,8 @@ class Findings:
         """Notes and warnings for the user, one line each, in SI."""
         solution, sure = self.solution, self.sure
         lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
+        lines += [f"assumed in step {i}: {cause}" for i, cause in enumerate(self.assumed, 1)]
+        lines += [f"the next step was not taken: {self.stopped}"] if self.stopped else []
         for e, modelled in zip(self.experiments, solution.modelled):
             lines += notes_on_residuals(e, modelled)
         for name in solution.task.names:

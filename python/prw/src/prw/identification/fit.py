@@ -22,9 +22,9 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from prw.errors import UserError
-from prw.identification.effects import columns
+from prw.identification.effects import columns, including
 from prw.identification.experiment import Experiment, spectra
-from prw.identification.kinds import FILTERS
+from prw.identification.kinds import FILTERS, LINEAR
 from prw.identification.model import Model
 from prw.identification.response import FURTHEST, Discrete, Distortion, Response, discrete
 from prw.motion import Array
@@ -98,9 +98,32 @@ class Task:
         """Names of all unknowns: parameters, then distortions."""
         return (*self.names, *map(str, self.distortions))
 
+    @property
+    def patterns(self) -> tuple[Distortion, ...]:
+        """The distortions that add a pattern, see `effects`."""
+        return tuple(d for d in self.distortions if d.kind not in (*FILTERS, *LINEAR))
+
+    @property
+    def modelled(self) -> list[int]:
+        """Indices of the unknowns that change the linear model."""
+        linear = [k for k, d in enumerate(self.distortions, len(self.names)) if d.kind in LINEAR]
+        return [*range(len(self.names)), *linear]
+
     def values(self, logarithms: Array) -> dict[str, float]:
         """All parameters in SI, with the estimated ones at these logarithms."""
         return {**self.start, **dict(zip(self.names, np.exp(logarithms).tolist()))}
+
+    def including(
+        self, distortions: tuple[Distortion, ...] = (), drift: tuple[str, ...] = (), priors: Mapping[str, Prior] = {}
+    ) -> Task:
+        """The task with further distortions, drifting channels, and parameters with priors as unknowns."""
+        return replace(
+            self,
+            names=tuple(dict.fromkeys((*self.names, *priors))),
+            distortions=(*self.distortions, *distortions),
+            drift=(*self.drift, *drift),
+            priors={**priors, **self.priors},
+        )
 
     def first(self) -> Array:
         """Logarithms of the start values of `names`, then zeros, which mean no distortion: (p,)."""
@@ -210,7 +233,7 @@ class Comparison:
     def slopes(self, change: Discrete) -> tuple[Array, Array]:
         """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
 
-        change: the model's derivatives with respect to the parameters; derivatives with respect to the distortions follow.
+        change: the model's derivatives with respect to the unknowns that change it.
         The contribution of encoders' errors to the squares is not information. For example, at equal motor rates the difference
         of two encoders' steps seems to roll the wrist a little, and J3 would look determined."""
         outputs, transfer = self.response.slopes(change, self.initial)
@@ -368,7 +391,7 @@ class Fitter:
     ) -> list[tuple[dict[Distortion, Complex], Complex]]:
         """For each experiment, the contributions (all_bins, c) of the wanted effects to the channels, per unit of their sizes, and the
         sum of their parts that do not depend on the sizes."""
-        sizes = {d: d.value(x) for d, x in self._unknowns(logarithms).items() if d.kind not in FILTERS}
+        sizes = {d: d.value(x) for d, x in self._unknowns(logarithms).items() if d.kind not in (*FILTERS, *LINEAR)}
         (model,), values = self._models([logarithms]), self.task.values(logarithms)
         return [
             columns(model, values, e, self._response(logarithms, e, e.all_bins), comparison.initial, sizes, wanted)
@@ -377,8 +400,7 @@ class Fitter:
 
     def follow(self, point: Array) -> None:
         """Repeat the patterns of the task's effects for the motion at this point."""
-        wanted = [d for d in self.task.distortions if d.kind not in FILTERS]
-        if wanted:
+        if wanted := self.task.patterns:
             self._effects = [*self.effects(point, wanted)]
             self._responses, self._comparisons = (b"", []), ((), [])
 
@@ -397,12 +419,13 @@ class Fitter:
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
         """For each experiment the derivatives (2, bins, c, p) of the residuals with respect to the logarithms; and the
         part (p, p) of all their squares that is noise."""
-        steps = DIFFERENCE * np.eye(len(self.task.names), len(logarithms))
+        steps = DIFFERENCE * np.eye(len(logarithms))[self.task.modelled]
         around = self._models([*(logarithms + steps), *(logarithms - steps)])
         self.evaluations += 2 * len(steps)
         tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            table, of_noise = comparison.slopes(self._discrete(around, experiment).slopes(DIFFERENCE))
+            change = self._discrete(around, experiment).slopes(DIFFERENCE)
+            table, of_noise = comparison.slopes(change)
             tables.append(table)
             noise += of_noise
         return tables, noise
@@ -421,6 +444,11 @@ class Fitter:
         centre, strength = self._priors()
         weighted = (comparison.residual.ravel() for comparison in self.compare(logarithms))
         return np.concatenate([*weighted, strength * (centre - logarithms)])
+
+    def deviance(self, logarithms: Array) -> float:
+        """Minus twice the logarithm of the likelihood, up to a constant, without priors' normalization."""
+        spread = sum(comparison.spread for comparison in self.compare(logarithms))
+        return float(np.sum(self.residuals(logarithms) ** 2)) + spread
 
     def slopes(self, logarithms: Array) -> Array:
         """Derivatives (r, p) of residuals() with respect to the logarithms."""
@@ -460,7 +488,7 @@ class Fitter:
                 last, self.noise = self.noise, self._judged_noise(point)
                 if self._alike(self.noise, last):
                     break
-            followed = all(d.kind in FILTERS for d in self.task.distortions) or np.abs(point - start).max() < FOLLOWED
+            followed = not self.task.patterns or np.abs(point - start).max() < FOLLOWED
             if self._alike(self.noise, before) and followed:
                 break
         return point
@@ -488,7 +516,12 @@ class Fitter:
         )
 
     def _models(self, points: Iterable[Array]) -> list[StateSpace]:
-        return [self.model.at(self.task.values(point)) for point in points]
+        found = []
+        for point in points:
+            values, unknowns = self.task.values(point), self._unknowns(point)
+            sizes = {d: d.value(x) for d, x in unknowns.items()}
+            found.append(including(self.model.at(values), values, sizes))
+        return found
 
     def _discrete(self, models: Sequence[StateSpace], experiment: Experiment) -> Discrete:
         """The models, discretized with the experiment's step."""
@@ -513,9 +546,17 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
         low, high = task.bounds[name]
         if not low < task.start[name] < high:
             raise UserError(f"{name} starts at {task.start[name]:.6g}, outside of its bounds {low:.6g} to {high:.6g}")
-    fitter, first = Fitter(model, experiments, task), task.first()
-    fitter.follow(first)
-    point = fitter.settle(fitter.search(first, COARSE).x)
+    first = task.first()
+    fitter, point = _settled(model, experiments, task, first)
+    for d in task.patterns if len(task.patterns) > 1 else ():
+        # Two effects together may have other minima, which the solution with one of them avoids.
+        without = [each for each in task.patterns if each != d]
+        alone = replace(task, distortions=tuple(each for each in task.distortions if each not in without))
+        at = dict(zip(alone.unknowns, _settled(model, experiments, alone, alone.first(), {}, COARSE)[1]))
+        start = np.array([at.get(name, x) for name, x in zip(task.unknowns, first)])
+        other, end = _settled(model, experiments, task, start, {}, COARSE)
+        if other.deviance(end) < fitter.deviance(point) - RIVAL:
+            fitter, point = other, other.settle(end)
 
     # Other minima, at the noise of the first one.
     minima = [(point, 2 * fitter.search(point).cost)]
@@ -541,6 +582,21 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
     return _solution(fitter, point, misfit, rivals, len(others) + 1)
 
 
+def _settled(
+    model: Model,
+    experiments: Sequence[Experiment],
+    task: Task,
+    start: Array,
+    noise: Mapping[str, float] = {},
+    tolerances: Mapping[str, float] = FINE,
+) -> tuple[Fitter, Array]:
+    """A fitter whose noise and effects agree with its minimum, and this minimum (p,). noise: at the start, as for Fitter."""
+    fitter = Fitter(model, experiments, task, noise)
+    fitter.follow(start)
+    rounds = FEW_ROUNDS if tolerances is COARSE else ROUNDS
+    return fitter, fitter.settle(fitter.search(start, COARSE).x, rounds, tolerances)
+
+
 def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Array, float]], tried: int) -> Solution:
     compared, jacobians = fitter.compare(point), fitter.jacobians(point)
     modelled, count = fitter.modelled(point), fitter.evaluations
@@ -560,23 +616,15 @@ def refitted(
     compare causes. The fit starts from the solution. If a parameter then differs from its start value by more than a factor of
     e, the fit is repeated from the start values, and the better one counts."""
     was = solution.task
-    names = tuple(dict.fromkeys((*was.names, *priors)))
-    task = replace(
-        was,
-        names=names,
-        distortions=(*was.distortions, *distortions),
-        drift=(*was.drift, *drift),
-        priors={**priors, **was.priors},
-    )
+    task = was.including(distortions, drift, priors)
+    names = task.names
     at = dict(zip(was.unknowns, solution.logarithms.tolist()))
     first = task.first()
     starts = [np.array([at.get(name, x) for name, x in zip(task.unknowns, first)]), first]
     found = []
     for start_point in starts:
-        fitter = Fitter(solution.fitter.model, solution.fitter.experiments, task, solution.noise)
-        fitter.follow(start_point)
-        rounds = FEW_ROUNDS if tolerances is COARSE else ROUNDS
-        point = fitter.settle(fitter.search(start_point, COARSE).x, rounds, tolerances)
+        last = solution.fitter
+        fitter, point = _settled(last.model, last.experiments, task, start_point, solution.noise, tolerances)
         misfit = float(np.sum(fitter.residuals(point) ** 2))
         found.append(_solution(fitter, point, misfit, [], solution.tried))
         if np.abs(point[: len(names)] - first[: len(names)]).max() < 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -19,6 +20,8 @@ class Kind(NamedTuple):
         Unit for messages, and the factor from it to SI.
     belongs
         Whether it is a property of the rig, which the fit may include without a request.
+    positive
+        Whether it is never negative.
     """
 
     scale: float
@@ -26,6 +29,7 @@ class Kind(NamedTuple):
     unit: str = ""
     factor: float = 1.0
     belongs: bool = False
+    positive: bool = False
 
 
 #: The kinds of distortions by argument.
@@ -45,6 +49,7 @@ KINDS = {
         },
         "N.m",
         belongs=True,
+        positive=True,
     ),
     "backlash": Kind(
         1e-3,
@@ -56,6 +61,7 @@ KINDS = {
         "mrad",
         1e-3,
         belongs=True,
+        positive=True,
     ),
     "clearance": Kind(
         1e-3,
@@ -63,6 +69,7 @@ KINDS = {
         "mrad",
         1e-3,
         belongs=True,
+        positive=True,
     ),
     "cubic": Kind(
         100.0,
@@ -70,6 +77,34 @@ KINDS = {
         "rad^-2",
         belongs=True,
     ),
+    "asymmetry": Kind(
+        1e-2,
+        {name: f"excess of {name} on side 2 over side 1" for name in ("k1", "k2", "c1", "c2")},
+        "%",
+        1e-2,
+        belongs=True,
+    ),
+    "viscous": Kind(
+        1e-2,
+        {
+            "shafts": "viscous friction in both input shafts",
+            "between": "viscous friction of both shafts between the couplings",
+        },
+        "N.m.s/rad",
+        belongs=True,
+        positive=True,
+    ),
+    "softening": Kind(
+        1e-2,
+        {name: f"decrease of {name} over the recording" for name in ("k1", "k2")},
+        "%",
+        1e-2,
+        belongs=True,
+    ),
+    "turned": Kind(
+        1e-2, {"imu": "turn of the inertial sensor from pitch towards roll"}, "deg", math.pi / 180, belongs=True
+    ),
+    "fading": Kind(1e-2, unit="%", factor=1e-2),
     "crosstalk": Kind(
         1e-2,
         {
@@ -81,5 +116,6 @@ KINDS = {
         1e-2,
     ),
 }
-#: Kinds that filter a channel; the others add to the outputs.
+#: Kinds that filter a channel, and kinds that change the linear model; the others add to the outputs.
 FILTERS = ("delay", "lag", "gain")
+LINEAR = ("asymmetry", "viscous")

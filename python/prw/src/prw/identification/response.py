@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from prw.columns import CHANNELS
 from prw.identification.experiment import Experiment
-from prw.identification.kinds import FILTERS, KINDS
+from prw.identification.kinds import FILTERS, KINDS, LINEAR
 from prw.motion import Array
 from prw.state_space import Complex, StateSpace
 
@@ -125,6 +125,7 @@ class Response:
         #: Contribution of each of the six numbers d, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)
         self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
+        self._linear = [k for k, distortion in enumerate(distortions) if distortion.kind in LINEAR]
         self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
         for k, (distortion, x) in enumerate(distortions.items()):
             if distortion.kind in FILTERS and distortion.channel in experiment.channels:
@@ -160,10 +161,10 @@ class Response:
         return states
 
     def slopes(self, change: Discrete, d: Array) -> tuple[Complex, Complex]:
-        """Derivatives with respect to p parameters and the distortions, of outputs with transients `d` (6,): (p, f, c), and of
-        transfer: (p, f, c, 2).
+        """Derivatives with respect to the p unknowns, which are parameters and then distortions, of outputs with transients `d` (6,):
+        (p, f, c), and of transfer: (p, f, c, 2).
 
-        change: the model's derivatives with respect to the parameters."""
+        change: the model's derivatives with respect to the unknowns that change it, in the same order."""
         count, bins = len(change.A), len(self._states)
 
         def moved_by(block: Array, table: Complex) -> Complex:
@@ -177,8 +178,14 @@ class Response:
         moved = driven.reshape(bins, 3 * count, 6) @ self._resolvent.swapaxes(-1, -2) @ self.model.C.T
         table = moved.reshape(bins, 3, count, -1) + moved_by(change.C, states) + moved_by(change.D, self._motors)
         table = (table * self._filters[:, None, None]).transpose(2, 0, 3, 1)
-        outputs, transfer = table[..., 0], table[..., 1:]
         there: Complex = self.outputs + self.transients @ d
-        more: Complex = self._growths[..., None] * self.transfer
-        wider: Complex = np.concatenate([outputs, self._growths * there + self._added])
-        return wider, np.concatenate([transfer, more])
+        parameters = count - len(self._linear)
+
+        def placed(modelled: Complex, others: Complex) -> Complex:
+            """All unknowns: parameters, and distortions, some of which change the model."""
+            found = np.concatenate([modelled[:parameters], others])
+            found[[parameters + k for k in self._linear]] += modelled[parameters:]
+            return found
+
+        more = self._growths[..., None] * self.transfer
+        return placed(table[..., 0], self._growths * there + self._added), placed(table[..., 1:], more)

@@ -31,6 +31,8 @@ class Identification(Findings):
         Fits of parts of the recordings, if only these fit because a parameter changes over time.
     advice
         Experiments that would determine undetermined combinations.
+    assumed, stopped
+        The causes that `follow` has included, step by step, and why it took no further step.
     """
 
     def summary(self, *, command: bool = False) -> str:
@@ -42,11 +44,15 @@ class Identification(Findings):
             lines.append(
                 "verdict     the FMU explains the data"
                 + f", together with {' and '.join(self.additions)}" * bool(self.additions)
+                + ", if the steps that the notes list are assumed" * bool(self.assumed)
             )
         else:
             lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not reliable")
             lines += [f"  {misfit}" for misfit in self.misfits]
-            lines += [f"perhaps     {cause}" for cause in self.diagnosis_in(command=command) or [self.unknown_cause]]
+            causes = self.diagnosis_in(command=command) or [self.unknown_cause]
+            lines += [
+                f"{'perhaps' if i or len(causes) == 1 else 'try first':<12}{cause}" for i, cause in enumerate(causes)
+            ]
         for name, found in self.parameters.items():
             estimate, _, low, high = found.rounded()
             sureness = f"+- {found.relative:.2%}   95 % interval {low} to {high}"
@@ -125,6 +131,8 @@ class Identification(Findings):
                 "misfits": [misfit._asdict() for misfit in self.verdict.misfits],
                 "diagnosis": list(self.diagnosis),
                 "additions": self.additions,
+                "assumed": list(self.assumed),
+                "stopped": self.stopped,
                 "tried": [{"fault": f.name, "size": f.size, "standard_error": f.error} for f in self.verdict.faults],
                 "fitted": list(self.explanation.tried),
             },

@@ -73,8 +73,13 @@ class Hypothesis(NamedTuple):
 
     @property
     def signs(self) -> bool:
-        """Whether it follows the sign of a rate or a twist, and is never negative."""
+        """Whether it follows the sign of a rate or a twist."""
         return self.kind in ("friction", "backlash", "clearance")
+
+    @property
+    def positive(self) -> bool:
+        """Whether it is never negative."""
+        return self.kind in KINDS and KINDS[self.kind].positive
 
     @property
     def belongs(self) -> bool:
@@ -138,8 +143,8 @@ class Fault(NamedTuple):
 
     @property
     def possible(self) -> bool:
-        """Whether the size may be other than 0: neither friction nor backlash is ever negative."""
-        return self.size > 0 or not self.signs
+        """Whether the size may be other than 0: friction and backlash, for example, are never negative."""
+        return self.size > 0 or not self.hypothesis.positive
 
     @property
     def bias(self) -> Array:
@@ -210,7 +215,7 @@ def judge(solution: Solution) -> Verdict:
     inverse = covariance_of(solution.task.prior_information() + information_of(solution.jacobians))
     misfits: list[Misfit] = []
     faults: list[Fault] = []
-    additions = [each for kind, described in KINDS.items() if described.places for each in hypotheses(solution, kind)]
+    additions = [each for kind in KINDS if kind not in FILTERS for each in hypotheses(solution, kind)]
     effects = solution.fitter.effects(solution.logarithms, [d for each in additions for d in each.distortions])
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
 
