@@ -49,8 +49,6 @@ impl LibraryBuild<'_> {
         }
         if self.target == Some(WEBASSEMBLY) {
             command.args(["--config", &remap_standard_library(&self.directory)?]);
-            // Small for the page, and translated to C as fast as at level 3. With one level, both uses share a module.
-            command.args(["--config", &format!("profile.{PROFILE}.opt-level=\"s\"")]);
         }
         // The library needs no debug information, but cargo-zigbuild cannot strip libraries for macOS.
         if cargo == ZIGBUILD {

@@ -4,7 +4,7 @@ use super::Plan;
 use super::check::Checked;
 use super::describe::Described;
 use crate::c_sources::{LINKING, WEBASSEMBLY, c_sources};
-use crate::cargo::LibraryBuild;
+use crate::cargo::{LibraryBuild, PROFILE};
 use crate::content::ContentFile;
 use crate::cross::has_std;
 use crate::library::{stamp, with_stamp};
@@ -133,7 +133,11 @@ impl Page {
             eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
             return Ok(None);
         }
-        let build = LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, ..build.clone() };
+        // A module for the page should be small; the module for C sources is fast.
+        let small = format!("profile.{PROFILE}.opt-level=\"s\"");
+        let settings = [&[small], &build.settings[..]].concat();
+        let build =
+            LibraryBuild { target: Some(WEBASSEMBLY), arguments: &LINKING, settings, ..build.clone() };
         let path = match build.run() {
             Ok(path) => path,
             Err(error) => {
