@@ -151,7 +151,18 @@ pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
         End::Crash(why) => format!("{name} crashes ({why})"),
         End::Hang(seconds) => format!("{name} does not return within {seconds:.1} s"),
         End::Exit(code) => format!("{name} ends the process with exit status {code}"),
-        End::Unloadable(why) => format!("the library cannot be loaded: {why}"),
+        End::Unloadable(why) => {
+            // Some FMUs in Python, for example of PythonFMU, do not link to the interpreter.
+            let is_python =
+                ["undefined symbol: Py", "undefined symbol: _Py"].iter().any(|of| why.contains(of));
+            let missing = match is_python {
+                true => {
+                    "; it needs a process that has loaded Python, so only importers in Python can load it"
+                }
+                false => "",
+            };
+            format!("the library cannot be loaded: {why}{missing}")
+        }
         End::Flood(count) => {
             format!("{name} leads to {count} processes at a time, after which all were ended")
         }
@@ -231,4 +242,20 @@ pub fn status_name(status: i32) -> String {
     let names = ["OK", "Warning", "Discard", "Error", "Fatal", "Pending"];
     let name = usize::try_from(status).ok().and_then(|index| names.get(index));
     name.map_or_else(|| status.to_string(), |name| (*name).to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ending;
+    use crate::call_sequence::{End, Run};
+
+    #[test]
+    fn a_library_without_python_says_what_is_missing() {
+        let of =
+            |why: &str| ending(&Run { end: End::Unloadable(why.to_owned()), ..Run::default() }, &Vec::new());
+        let python = of("a.so: undefined symbol: PyExc_RuntimeError").expect("an end");
+        assert!(python.contains("a process that has loaded Python"), "{python}");
+        let other = of("a.so: undefined symbol: missing").expect("an end");
+        assert!(other.ends_with("undefined symbol: missing"), "{other}");
+    }
 }

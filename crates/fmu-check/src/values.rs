@@ -4,12 +4,33 @@ use crate::call_sequence::Values;
 use crate::description::{Description, Variable, kind_of};
 use fmi_abi::{BaseType, Causality, Variability};
 
+/// Largest relative difference of results that are equal up to their last digits: a model may convert units, or iterate in its
+/// initialization.
+pub const LAST_DIGITS: f64 = 1e-9;
+
+/// Returns the start values of a variable; `None` for a clock or a binary variable, and if not every element has one that can be read.
+pub fn start_values(description: &Description, index: usize) -> Option<Values> {
+    let variable = &description.variables[index];
+    let size = variable.size?;
+    match variable.base? {
+        BaseType::String => {
+            let texts = (0..size).map(|element| Some(variable.start_of(element)?.as_bytes().to_owned()));
+            Some(Values::Strings(texts.map(|text| text.map(Some)).collect::<Option<_>>()?))
+        }
+        BaseType::Binary => None,
+        _ => {
+            let numbers = variable.starts();
+            (numbers.len() == size).then(|| Values::new(description.kind(index), numbers))
+        }
+    }
+}
+
 /// Returns values of a variable other than its start values: near numbers, the next or previous integer, the other Boolean, a
 /// non-ASCII string, or bytes with NULs. A floating-point number that starts at its maximum keeps its value. Returns `None` for
 /// clocks, for enumerations without a maximum, and if no other integer is within the range.
 pub fn other_values(description: &Description, index: usize) -> Option<Values> {
     let variable = &description.variables[index];
-    let (starts, size) = (variable.starts(), variable.starts_count());
+    let (starts, size) = (variable.starts(), variable.size?);
     let is_text = matches!(variable.base?, BaseType::String | BaseType::Binary);
     if !is_text && starts.len() != size {
         // The start value cannot be read, which is a finding of the description.
@@ -77,7 +98,7 @@ pub fn inputs_by(description: &Description, by: f64) -> Vec<(usize, Values)> {
         variable.causality == Causality::Input
             && description.is_continuous(*index)
             && !variable.once_per_instant
-            && variable.size == Some(variable.starts_count())
+            && variable.size == Some(variable.starts().len())
     };
     let inputs = description.variables.iter().enumerate().filter(is_wanted).take(1000);
     let value = |(index, variable): (usize, &Variable)| {

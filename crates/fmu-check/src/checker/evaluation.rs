@@ -68,7 +68,7 @@ impl Checker {
     }
 
     /// Returns a criterion like `differ`, which allows relative differences up to `tolerance`.
-    fn differ_by(
+    pub fn differ_by(
         &self,
         tolerance: f64,
         one: &[Read],

@@ -4,7 +4,7 @@ use super::derivatives::{middle_values, set_known};
 use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::{Description, Unknown};
-use crate::values::{near, other_values};
+use crate::values::{LAST_DIGITS, near, other_values, start_values};
 use crate::writer::Part::{Begin, Enter, Make};
 use crate::writer::{Read, Trajectory, Writer, number_of, value_of};
 use fmi_abi::{Causality, DependencyKind};
@@ -51,12 +51,14 @@ impl Perturbed {
         unknowns.iter().find_map(|unknown| {
             let [one, other, again] = [0, 1, 2].map(|which| value_of(run, &self.0[which], *unknown));
             let (one, other, again) = (one?, other?, again?);
-            let at = one.differ(&other)?;
+            let differ =
+                |to: &Values| one.differ_beyond(to, LAST_DIGITS, |_| description.variables[*unknown].nominal);
+            let at = differ(&other)?;
             let [name, known] = [*unknown, known].map(|index| &description.variables[index].name);
             let (from, to) = (one.show(at), other.show(at));
             let message =
                 || format!("{name} goes from {from} to {to} when {known} changes, and does not list it");
-            one.differ(&again).is_none().then(message)
+            differ(&again).is_none().then(message)
         })
     }
 }
@@ -179,19 +181,9 @@ fn discrete(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the start values of a variable, and values that differ from them; `None` if `other_values` has none.
+/// Returns the start values of a variable, and values that differ from them; `None` if it lacks one of them.
 fn start_and_other_values(description: &Description, index: usize) -> Option<[Values; 2]> {
-    let variable = &description.variables[index];
-    let other = other_values(description, index)?;
-    let start = match &other {
-        Values::Strings(_) => {
-            let texts =
-                (0..variable.starts_count()).map(|at| Some(variable.start_of(at)?.as_bytes().to_owned()));
-            Values::Strings(texts.collect())
-        }
-        Values::Numbers(kind, _) => Values::new(*kind, variable.starts()),
-    };
-    Some([start, other])
+    Some([start_values(description, index)?, other_values(description, index)?])
 }
 
 /// Checks the dependencies of initial unknowns on numeric inputs and numeric variables with `initial` = `exact`, such as

@@ -37,8 +37,8 @@ struct IntervalEnd {
     integration: u32,
     /// Number of the update of the discrete states.
     update: u32,
-    /// Reads of the event indicators before and after Event Mode.
-    indicators: [u32; 2],
+    /// Reads of the event indicators before and after Event Mode; `None` if the FMU has none.
+    indicators: [Option<u32>; 2],
     /// Reads of the discrete variables before and after Event Mode.
     reads: [Vec<Read>; 2],
 }
@@ -50,7 +50,7 @@ pub fn unannounced(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
     let description = &checker.description;
     let indicators = description.indicators_count();
     let variables = discrete(checker);
-    if indicators == 0 || variables.is_empty() {
+    if variables.is_empty() {
         return Ok(());
     }
     let size = step_size(description);
@@ -61,9 +61,13 @@ pub fn unannounced(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result
         // Events are unlikely at these ends of intervals, because the fraction is unusual.
         let end = description.start_time + (number as f64 + 0.381_966) * size;
         let integration = writer.integrate(0, begin, end);
-        let before = (writer.vector(0, "GetEventIndicators", indicators), writer.read(0));
+        let read = |writer: &mut Writer| {
+            let indicators = (indicators > 0).then(|| writer.vector(0, "GetEventIndicators", indicators));
+            (indicators, writer.read(0))
+        };
+        let before = read(&mut writer);
         let update = writer.event(0)[1];
-        let after = (writer.vector(0, "GetEventIndicators", indicators), writer.read(0));
+        let after = read(&mut writer);
         let (indicators, reads) = ([before.0, after.0], [before.1, after.1]);
         ends.push(IntervalEnd { time: end, integration, update, indicators, reads });
         begin = end;
@@ -100,7 +104,10 @@ fn unannounced_change(
         let no_event = run.written(end.integration)?.numbers().first()?.is_infinite();
         let next = event(run, before.update, fmi3)?.next;
         let is_due = next.is_some_and(|next| next <= end.time + 1e-3 * (end.time - before.time));
-        let numbers = |id: u32| run.written(id).filter(|_| run.succeeds(id)).map(Values::numbers);
+        let numbers = |id: Option<u32>| match id {
+            Some(id) => run.written(id).filter(|_| run.succeeds(id)).map(Values::numbers),
+            None => Some(Vec::new()),
+        };
         let (then, now) = (numbers(before.indicators[1])?, numbers(end.indicators[0])?);
         let same_signs = then.iter().zip(&now).all(|(then, now)| (*then > 0.0) == (*now > 0.0));
         // With a hysteresis, a relation may change before its indicator changes its sign, so indicators near zero prove nothing.

@@ -5,7 +5,7 @@ use crate::call_sequence::{Run, Values};
 use crate::checker::Checker;
 use crate::description::Variable;
 use crate::finding::{Criterion, any};
-use crate::values::other_values;
+use crate::values::{LAST_DIGITS, other_values};
 use crate::worker::FILL;
 use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
 use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of};
@@ -22,18 +22,13 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
         true => [&[Make, Enter], &[Make]],
         false => [&[Make, Enter], &[Make, Enter, Part::Call("ExitInitializationMode")]],
     };
-    let may_change = |index: &usize| {
-        let variable = &model.variables[*index];
-        variable.causality != Causality::Input
-            && [Variability::Discrete, Variability::Continuous].contains(&variable.variability)
-    };
     for (number, parts) in states.into_iter().enumerate() {
         let (after, mut writer) = (number == 1 && !checker.fmi3(), checker.writer(trajectory));
         writer.write(0, parts);
         let mut indices = sample(&model, 10_000);
         indices.retain(|index| {
             let early = model.is_readable_while_initializing(*index);
-            if after { !early && !may_change(index) } else { early }
+            if after { !early && !may_change(&model.variables[*index]) } else { early }
         });
         let (reads, model) = (writer.read_anyway(0, &indices), Arc::clone(&model));
         checker.check("start_values.start", writer.sequence, move |run| {
@@ -47,6 +42,12 @@ pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     }
     values(checker, trajectory)?;
     constants(checker, trajectory)
+}
+
+/// Returns whether a variable may change at the end of the initialization.
+fn may_change(variable: &Variable) -> bool {
+    variable.causality != Causality::Input
+        && [Variability::Discrete, Variability::Continuous].contains(&variable.variability)
 }
 
 /// Returns whether a value equals the start value. Returns true for a variable that may have other values.
@@ -185,8 +186,8 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     // strings, so these variables are set one at a time.
     let separate = others.iter().take(checker.at_most(40)).flat_map(|index| {
         // The string has 500 bytes, so it is longer than usual buffers.
-        let long = Values::strings(&b"long ".repeat(100), variable(index).starts_count());
-        let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
+        let size = variable(index).size.filter(|_| variable(index).base == Some(BaseType::String));
+        let long = size.map(|size| (*index, Values::strings(&b"long ".repeat(100), size)));
         with_other(index).into_iter().chain(long).map(|value| vec![value])
     });
     if !near.is_empty() {
@@ -196,7 +197,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let backward = near.iter().rev().cloned().collect();
     for values in [near, backward].into_iter().filter(|near| !near.is_empty()).chain(separate) {
         for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
-            read_back(checker, trajectory, before, values.clone(), after)?;
+            read_back(checker, trajectory, (before, after, true), values.clone())?;
         }
     }
     // At a communication point, only inputs and tunable variables are set, most of which can be set outside of Event Mode. A rejected
@@ -209,7 +210,7 @@ pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             of.is_float() || of.variability != Variability::Discrete && trajectory.is_stepped();
         let is_settable = may_change && without_event && !of.once_per_instant;
         if let Some(value) = with_other(index).filter(|_| is_settable) {
-            read_back(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;
+            read_back(checker, trajectory, (&[Begin, Points(2)], &[], false), vec![value])?;
         }
     }
     inputs(checker, trajectory)
@@ -227,7 +228,7 @@ fn same_effect(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Val
             writer.write(0, &[Part::Read, Leave, Part::ReadAll, Free]).reads
         });
     let message = "{} is {} with values set before Initialization Mode, {} with values set in it";
-    let differ = checker.differ(&before, &within, message);
+    let differ = checker.differ_by(LAST_DIGITS, &before, &within, message);
     checker.check("start_values.when", writer.sequence, move |run| {
         let succeeded = sets.iter().all(|id| run.succeeds(*id));
         if succeeded { differ(run) } else { None }
@@ -246,28 +247,36 @@ pub fn values_are_kept(
     Box::new(move |run: &Run| {
         let succeeded = ids.iter().all(|id| run.succeeds(*id));
         values.iter().filter(|_| succeeded).find_map(|(index, value)| {
-            // A model that converts units may round the last digits, as for start values.
             let read = value_of(run, &reads, *index)?;
-            read.differ_beyond(value, 1e-9, |_| 0.0)?;
+            read.differ_beyond(value, LAST_DIGITS, |_| 0.0)?;
             let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and {has} {}", value.show(0), read.show(0)))
         })
     })
 }
 
-/// Checks that getters return values that were set between the parts `before` and `after`.
+/// Checks that getters return values that were set between the parts `before` and `after`. If these end in Initialization Mode, variables
+/// that cannot be read in it are read after it, unless they may change.
 fn read_back(
     checker: &Checker,
     trajectory: &Trajectory,
-    before: &[Part],
+    (before, after, initializing): (&[Part], &[Part], bool),
     values: Vec<(usize, Values)>,
-    after: &[Part],
 ) -> anyhow::Result<()> {
+    let description = &checker.description;
     let mut writer = checker.writer(trajectory);
     writer.write(0, before);
-    let sets = writer.set(0, &values);
+    let mut sets = writer.set(0, &values);
     writer.write(0, after);
-    let reads = read_variables(&mut writer, &values);
+    let is_early =
+        |(index, _): &(usize, Values)| !initializing || description.is_readable_while_initializing(*index);
+    let (early, mut late): (Vec<_>, Vec<_>) = values.iter().cloned().partition(is_early);
+    let mut reads = read_variables(&mut writer, &early);
+    late.retain(|(index, _)| !may_change(&description.variables[*index]));
+    if !late.is_empty() {
+        sets.extend(writer.write(0, &[Part::Call("ExitInitializationMode")]).ids);
+        reads.extend(read_variables(&mut writer, &late));
+    }
     checker.check("start_values.set", writer.sequence, values_are_kept(checker, sets, reads, values, "reads"))
 }
 

@@ -4,33 +4,13 @@ use super::start_values::settable;
 use super::states::from_bytes;
 use crate::call_sequence::Values;
 use crate::checker::Checker;
-use crate::description::Description;
 use crate::finding::{any, unless_fails};
-use crate::values::other_values;
+use crate::values::{other_values, start_values};
 use crate::writer::Part::{Call, Enter, Leave, Make, Points, ReadAll, Restore, Run, Save};
 use crate::writer::Trajectory;
-use fmi_abi::BaseType;
 
 /// Variables, by index, with their values.
 type Assigned = Vec<(usize, Values)>;
-
-/// Returns the start values of a variable; `None` for a clock or a binary variable, and for numbers that do not have one start
-/// value for each element.
-fn starts(description: &Description, index: usize) -> Option<Values> {
-    let variable = &description.variables[index];
-    match variable.base? {
-        BaseType::String => {
-            let texts =
-                (0..variable.size?).map(|element| Some(variable.start_of(element)?.as_bytes().to_owned()));
-            Some(Values::Strings(texts.collect()))
-        }
-        BaseType::Binary => None,
-        _ => {
-            let values = Values::new(description.kind(index), variable.starts());
-            (variable.starts().len() == variable.size?).then_some(values)
-        }
-    }
-}
 
 /// Returns groups of variables. Each group has values that differ from the start values, and the start values. The first group has all
 /// variables. A model may reject new values of integers, Booleans and strings, so the other groups are the floating-point variables, and
@@ -47,7 +27,7 @@ fn groups(checker: &Checker) -> Vec<(Assigned, Assigned)> {
     }
     let assigned = |indices: Vec<usize>| -> (Assigned, Assigned) {
         let both = indices.into_iter().filter_map(|index| {
-            Some(((index, other_values(description, index)?), (index, starts(description, index)?)))
+            Some(((index, other_values(description, index)?), (index, start_values(description, index)?)))
         });
         both.unzip()
     };

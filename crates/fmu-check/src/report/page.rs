@@ -111,7 +111,27 @@ pub fn page(report: &Report) -> String {
         ("{seed}", report.seed.to_string()),
         ("{findings}", text),
     ];
-    values
-        .into_iter()
-        .fold(include_str!("page.html").to_owned(), |page, (name, value)| page.replace(name, &value))
+    filled(include_str!("page.html"), &values)
+}
+
+/// Returns a text in which names in braces are replaced by their values. A value may contain a name, which stays.
+fn filled(text: &str, values: &[(&str, String)]) -> String {
+    let parts = text.split_inclusive('}').map(|part| {
+        let found = values.iter().find_map(|(name, value)| Some([part.strip_suffix(name)?, value]));
+        found.map_or(part.to_owned(), |found| found.concat())
+    });
+    parts.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    /// A model can be called `{findings}`.
+    #[test]
+    fn values_are_not_replaced() {
+        let values = [("{model}", "{findings}".to_owned()), ("{findings}", "none".to_owned())];
+        assert_eq!(
+            super::filled("p { }<h1>{model}</h1>{findings}.", &values),
+            "p { }<h1>{findings}</h1>none."
+        );
+    }
 }

@@ -59,13 +59,16 @@ pub fn work(job: Job, file: File) {
     executor.write(&Last { bytes: std::mem::take(&mut locked(&executor.bytes)) });
 }
 
-/// On Unix, creates a symbolic link with this name in the working directory, which leads to the directory of the FMU. Returns the
-/// setting with all paths changed to lead through this link.
+/// Creates a symbolic link with this name in the working directory, which leads to the directory of the FMU, or on Windows, where links
+/// need a privilege, a copy of that directory. Returns the setting with all paths changed to lead there.
 fn elsewhere(setting: &Setting, name: &str) -> Setting {
     let directory = setting.resources.parent().unwrap_or(&setting.resources);
     let there = std::env::current_dir().unwrap_or_default().join(name);
     #[cfg(unix)]
-    if let Err(error) = std::os::unix::fs::symlink(directory, &there) {
+    let created = std::os::unix::fs::symlink(directory, &there);
+    #[cfg(not(unix))]
+    let created = copy(directory, &there);
+    if let Err(error) = created {
         fail(&there, &error);
     }
     let moved = |path: &Path| there.join(path.strip_prefix(directory).unwrap_or(path));
@@ -74,6 +77,20 @@ fn elsewhere(setting: &Setting, name: &str) -> Setting {
         resources: moved(&setting.resources),
         ..setting.clone()
     }
+}
+
+/// Copies a directory.
+#[cfg(not(unix))]
+fn copy(directory: &Path, to: &Path) -> std::io::Result<()> {
+    std::fs::create_dir(to)?;
+    for entry in std::fs::read_dir(directory)? {
+        let (from, name) = entry.map(|entry| (entry.path(), entry.file_name()))?;
+        match from.is_dir() {
+            true => copy(&from, &to.join(name))?,
+            false => drop(std::fs::copy(&from, to.join(name))?),
+        }
+    }
+    Ok(())
 }
 
 /// Ends the process because of a fault that is not the FMU's.

@@ -10,7 +10,7 @@ fn clean(fmi: u32, variant: &str, notes: &[&str]) {
     let directory = TempDir::new().expect("a directory");
     let path = fmu(directory.path(), fmi, &library(&[]), |text| text);
     // The unusual behaviour concerns these topics.
-    let topics = ["--only", "life_cycle,states,start_values,results,reset"];
+    let topics = ["--only", "life_cycle,states,start_values,results,reset,dependencies"];
     let options = if variant == "none" { &[][..] } else { &topics };
     let (_, report) = found(&path, variant, &[&["--repeat", "0.3"][..], options].concat());
     let findings = report["findings"].as_array().expect("a list").iter();
@@ -36,7 +36,7 @@ fn none_in_fmi3() {
 }
 
 /// Asserts that unusual behaviour is not a violation if the standard allows it: an event needs several updates, a local variable
-/// cannot be read in Initialization Mode, and a solver takes other steps after a restart.
+/// cannot be read in Initialization Mode, a solver takes other steps after a restart, and the last digits of a result depend on parameters.
 #[test]
 fn unusual_behaviour_is_accepted() {
     clean(2, "unusual", &["states.digits"]);
@@ -59,6 +59,19 @@ fn any_default_experiment_is_checked() {
         let found: Vec<_> = found.iter().filter(|(name, _)| name != "results.interfaces").collect();
         assert!(found.is_empty(), "{stop}, {size}: {found:?} {}", report["unreached"]);
     }
+}
+
+/// Asserts that a start value that cannot be read, which is a finding of the description, does not make fmu-check pass arrays without it.
+#[test]
+fn arrays_have_a_value_for_each_variable() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(&[]), |text| {
+        text.replace(r#"<Real start="0"/>"#, r#"<Real start="0,5"/>"#)
+    });
+    let (found, _) = found(&path, "none", &["--only", "dynamics,description", "--no-shrink"]);
+    let mut names: Vec<_> = found.iter().map(|(name, _)| name.as_str()).collect();
+    names.dedup();
+    assert_eq!(names, ["description.schema", "description.start"], "{found:?}");
 }
 
 /// Asserts that there is no finding if this machine lacks a library that the FMU needs, but that the interface types are reported

@@ -18,6 +18,19 @@ fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
     all_found(&spring(directory.path(), fmi), topics, expected);
 }
 
+/// Asserts that an event is unannounced if the description forgets the event indicators.
+#[test]
+fn events_without_indicators() {
+    let directory = TempDir::new().expect("a directory");
+    let description = c_models::read("spring2.xml").replace(r#" numberOfEventIndicators="2""#, "");
+    let library = c_models::library("spring", &[]);
+    let path = c_models::pack(directory.path(), ("spring", 2), &description, &library, &[]);
+    let found = findings(&path, "none", "dynamics", &directory.path().join("out"));
+    assert_eq!(found.len(), 1, "{found:#?}");
+    let observed = found[0]["observed"].as_str().expect("a string");
+    assert!(found[0]["name"] == "dynamics.unannounced" && observed.contains("touches changes"), "{observed}");
+}
+
 #[test]
 fn steps_and_indicators() {
     let faults = [

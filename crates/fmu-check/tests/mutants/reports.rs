@@ -241,6 +241,19 @@ fn calls_show_it() {
     }
 }
 
+/// Asserts that parameters are read after Initialization Mode, because FMI 2.0 does not let importers read them in it.
+#[test]
+fn parameters_of_fmi2_are_read_after_the_initialization() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(&[]), |text| text);
+    let (_, report) = found(&path, "set_ignored", &["--only", "start_values", "--no-shrink"]);
+    let finding =
+        report["findings"].as_array().and_then(|all| all.iter().find(|of| of["name"] == "start_values.set"));
+    let calls = finding.expect("a finding")["calls"].as_array().expect("a list");
+    let at = |name: &str| calls.iter().position(|call| call.as_str().is_some_and(|call| call.contains(name)));
+    assert!(at("fmi2ExitInitializationMode") < at("fmi2GetReal"), "{calls:#?}");
+}
+
 /// Asserts that a replay fails with a message if the report has no such finding, if it has no calls, or if it is from another
 /// version.
 #[test]
