@@ -42,7 +42,9 @@ pub use mode::{AllowedStates, FmiState, Mode};
 pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
-pub use text::{SHOWN, is_c_identifier, is_plain_file_name, one_line, shown, shown_number, shown_to};
+pub use text::{
+    SHOWN, is_c_identifier, is_plain_file_name, is_structured_name, one_line, shown, shown_number, shown_to,
+};
 pub use unit::{BASE_UNITS, BaseUnit, DisplayUnit, Unit};
 pub use value::{Value, boolean};
 

@@ -57,6 +57,60 @@ pub fn is_c_identifier(text: &str) -> bool {
         && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
 }
 
+/// Returns whether a name is structured (section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0): `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
+pub fn is_structured_name(name: &str) -> bool {
+    if let Some(differentiated) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')')) {
+        // A comma within brackets separates indices.
+        return match differentiated.rsplit_once(',') {
+            Some((name, order)) if is_number(order.trim()) => is_path(name),
+            _ => is_path(differentiated),
+        };
+    }
+    is_path(name)
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit())
+}
+
+/// Whether this is a sequence of names, with or without indices, separated by dots.
+fn is_path(mut rest: &str) -> bool {
+    loop {
+        rest = match rest.strip_prefix('\'') {
+            Some(quoted) => {
+                let mut escaped = false;
+                let end = quoted.find(|c| {
+                    let ends = c == '\'' && !escaped;
+                    escaped = c == '\\' && !escaped;
+                    ends
+                });
+                match end {
+                    Some(end) if end > 0 => &quoted[end + 1..],
+                    _ => return false,
+                }
+            }
+            None => {
+                let end = rest.find(['[', '.']).unwrap_or(rest.len());
+                if !is_c_identifier(&rest[..end]) {
+                    return false;
+                }
+                &rest[end..]
+            }
+        };
+        if let Some(indices) = rest.strip_prefix('[') {
+            let Some((indices, behind)) = indices.split_once(']') else { return false };
+            if !indices.split(',').map(str::trim).all(is_number) {
+                return false;
+            }
+            rest = behind;
+        }
+        match rest.strip_prefix('.') {
+            Some(behind) => rest = behind,
+            None => return rest.is_empty(),
+        }
+    }
+}
+
 /// Returns whether a string is safe as the name of a file in any directory: it contains only letters, digits, spaces and `_-+.`, and
 /// begins with a letter, a digit or `_`. So it is neither a path nor an option of a program.
 pub fn is_plain_file_name(text: &str) -> bool {

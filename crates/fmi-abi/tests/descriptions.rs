@@ -172,3 +172,34 @@ fn aliases_and_unknown_types_of_fmi_3_are_read() {
     assert_eq!((found.variables.len(), aliases), (2, vec![("z", Some("deg")), ("w", None)]));
     assert_eq!(found.faults, [(Fault::Type, "q has the type Float128, which is unknown".to_owned())]);
 }
+
+/// These faults do not prevent a run.
+#[test]
+fn what_counts_once_is_reported() {
+    let definitions = "<UnitDefinitions><Unit name='m'/><Unit name='m'/></UnitDefinitions>\
+        <TypeDefinitions><Int8Type name='T'/><EnumerationType name='E'><Item name='a' value='1'/><Item name='b' value='1'/></EnumerationType></TypeDefinitions>\
+        <DefaultExperiment tolerance='-1'/>\
+        <ModelStructure><Output valueReference='1' dependencies='3' dependenciesKind='constant fixed'/><Output valueReference='1'/>\
+        <EventIndicator valueReference='2'/></ModelStructure>";
+    let variables = "<Float64 name='y' valueReference='1' causality='output' declaredType='T'><Dimension valueReference='2'/></Float64>\
+        <Int32 name='n' valueReference='2' start='2'/><Float64 name='u' valueReference='3' causality='input' start='0'/>";
+    let found = fmi3(variables, definitions);
+    let faults: Vec<_> = found.faults.iter().map(|(fault, why)| (*fault, why.as_str())).collect();
+    assert_eq!(
+        faults,
+        [
+            (Fault::Experiment, "the tolerance -1 is negative"),
+            (Fault::Unit, "two units are called m"),
+            (Fault::Definition, "y is of type Float64, but its declaredType is of type Int8"),
+            (
+                Fault::Dimension,
+                "the size of y is the variable 2, which is neither a structural parameter nor a constant of type UInt64"
+            ),
+            (Fault::Definition, "the item b = 1 of E has the name or the value of another item"),
+            (Fault::Unknown, "an Output of ModelStructure has 2 dependenciesKind, but 1 dependencies"),
+            (Fault::Unknown, "ModelStructure lists y twice as Output"),
+            (Fault::Unknown, "the event indicator n is not a continuous floating-point number"),
+        ]
+    );
+    assert_eq!((found.outputs.len(), found.default_tolerance), (1, None));
+}

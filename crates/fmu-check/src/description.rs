@@ -8,7 +8,7 @@ use fmi_abi::{
     BaseType, Causality, Initial, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
     shown,
 };
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::ops::Deref;
 
 /// Model description, with values that the checks derive from it.
@@ -22,7 +22,7 @@ pub struct Description {
     pub stop_time: Option<f64>,
     /// Step size of the default experiment, if it has a positive one.
     pub step_size: Option<f64>,
-    /// Rules that the model description breaks.
+    /// Rules that the model description breaks, except those of `consistency`.
     pub wrong: Vec<Observation>,
     /// Types and value references of the variables that may be read in Initialization Mode of FMI 2.0.
     early: HashSet<Handle>,
@@ -55,8 +55,11 @@ impl Description {
         let observation = |(fault, why): &(Fault, String)| {
             let rule = match fault {
                 Fault::Reference => "description.references",
-                Fault::Type => "description.types",
-                Fault::Structure => "description.structure",
+                Fault::Type | Fault::Definition => "description.types",
+                Fault::Structure | Fault::Unknown => "description.structure",
+                Fault::Unit => "description.units",
+                Fault::Dimension => "description.dimensions",
+                Fault::Experiment => "description.tolerance",
                 Fault::Attribute | Fault::Value => return None,
             };
             Some((rule, why.clone()))
@@ -97,7 +100,7 @@ impl Description {
             }
         }
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
-        let (mut names, mut references, mut set) = (HashSet::new(), HashSet::new(), HashMap::new());
+        let (mut names, mut references) = (HashSet::new(), HashSet::new());
         for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             let (listed, output) = (outputs.contains(&index), variable.causality == Causality::Output);
@@ -133,32 +136,12 @@ impl Description {
             if variable.display_unit.is_some() && variable.unit.is_none() {
                 add("description.units", format!("{name} has a displayUnit, but no unit"));
             }
-            // If two parameters have one reference and a start each, it is unclear which start value the importer sets.
-            if variable.causality == Causality::Parameter
-                && !variable.start.is_empty()
-                && let Some(other) = set.insert(handle(self.standard, variable), name)
-            {
-                add(
-                    "description.references",
-                    format!("{other} and {name} have one reference and a start each"),
-                );
-            }
             wrong.extend(faults(self.standard, variable));
         }
         let independent = self.variables.iter().filter(|of| of.causality == Causality::Independent).count();
         if independent > 1 || independent == 0 && self.standard == Standard::Fmi3 {
             let why = format!("{independent} variables have the causality independent");
             wrong.push(("description.independent", why));
-        }
-        // The reverse is not required: a variable with the attribute `derivative` is listed only if it is a state derivative
-        // (section 2.2.8 of FMI 2.0).
-        for unknown in &self.derivatives {
-            let variable = &self.variables[unknown.variable];
-            if variable.derivative_of.is_none() {
-                let why =
-                    format!("{} is among the derivatives, but lacks the attribute derivative", variable.name);
-                wrong.push(("description.structure", why));
-            }
         }
         if let Some(why) = self.stop_time.and_then(|stop| ends_too_early(self.start_time, stop)) {
             wrong.push(("description.experiment", why));
@@ -248,9 +231,9 @@ impl Description {
 }
 
 /// Type in the names of getters and setters, and value reference. In FMI 2.0, variables of different types may have the same reference.
-type Handle = (Option<&'static str>, u32);
+pub type Handle = (Option<&'static str>, u32);
 
-fn handle(standard: Standard, variable: &Variable) -> Handle {
+pub fn handle(standard: Standard, variable: &Variable) -> Handle {
     (variable.base.map(|base| type_name(standard, base)), variable.reference)
 }
 

@@ -7,9 +7,9 @@
 //! twice, and written to the report with the results that show the finding (`reproduce`, `evidence`), from which `replay` executes
 //! it again. All `unsafe` code is in `worker`, which loads and calls the library of the FMU in processes that may crash.
 //!
-//! Each module uses only modules before it: `call_sequence`, `worker`, `evidence`, `finding`, `rules`,
-//! `description`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`, `schema`,
-//! `checks`, `opening`, `activity`, `schedule`, `baseline`, `report`, `session`, `replay`.
+//! Each module uses only modules before it: `call_sequence`, `worker`, `evidence`, `finding`, `rules`, `description`,
+//! `consistency`, `values`, `legal`, `writer`, `shrink`, `run`, `reproduce`, `always`, `options`, `checker`, `trajectory`,
+//! `schema`, `checks`, `opening`, `activity`, `schedule`, `baseline`, `report`, `session`, `replay`.
 
 mod activity;
 mod always;
@@ -17,6 +17,7 @@ mod baseline;
 mod call_sequence;
 mod checker;
 mod checks;
+mod consistency;
 mod description;
 mod evidence;
 mod finding;

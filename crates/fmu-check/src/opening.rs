@@ -3,6 +3,7 @@
 use crate::call_sequence::Setting;
 use crate::checker::Checker;
 use crate::checks::package;
+use crate::consistency;
 use crate::description::Description;
 use crate::options::{INTERFACES, Options};
 use crate::rules::Observation;
@@ -10,8 +11,12 @@ use crate::run::Workers;
 use anyhow::{anyhow, bail};
 use fmi_abi::Standard;
 use fmi_abi::files::{MAX_XML, Scratch, read};
+use std::collections::HashMap;
 use std::path::Path;
 use std::time::Instant;
+
+/// Maximum number of observations of a rule about the files.
+const MOST_OBSERVATIONS: usize = 100;
 
 /// Unpacks an FMU. Returns the temporary directory with its files, and a checker that has recorded the findings in these files
 /// and the interface types that cannot be checked.
@@ -42,7 +47,15 @@ pub fn opened(path: &Path, options: &Options, begin: Instant) -> anyhow::Result<
     if options.wants("description") {
         observations.extend(encoding);
         observations.extend(description.wrong.iter().cloned());
+        observations.extend(consistency::broken(&description));
     }
+    // One mistake of a generator can concern all variables.
+    let mut counts: HashMap<&str, usize> = HashMap::new();
+    observations.retain(|(rule, _)| {
+        let count = counts.entry(*rule).or_default();
+        *count += 1;
+        *count <= MOST_OBSERVATIONS
+    });
     let (setting, without) = setting(options, directory, &description);
     let checker = Checker::new(description, setting, workers, options, begin);
     observations.into_iter().for_each(|(name, observed)| checker.add(checker.broken(name, observed)));

@@ -7,7 +7,8 @@ use crate::model::LoadedModel;
 use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmi_abi::{
-    BaseType, BaseUnit, Causality, Standard, Value, Variability, empty_range, ends_too_early, is_c_identifier,
+    BaseType, BaseUnit, Causality, Standard, Value, Variability, empty_range, ends_too_early,
+    is_c_identifier, is_structured_name,
 };
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -30,7 +31,7 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
         check_name("the variable name", name)?;
         check_line(format_args!("the description of {name}"), &variable.description)?;
         ensure!(
-            !table.arrays || is_structured(name),
+            !table.arrays || is_structured_name(name),
             "the variable name '{}' is not a name of the structured naming convention, which a model with arrays needs: \
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
@@ -87,60 +88,6 @@ pub(crate) fn check_name(label: impl Display, name: &str) -> Result<()> {
         name.escape_debug()
     );
     Ok(())
-}
-
-/// Whether a name is structured (section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0): `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
-fn is_structured(name: &str) -> bool {
-    if let Some(differentiated) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')')) {
-        // A comma within brackets separates indices.
-        return match differentiated.rsplit_once(',') {
-            Some((name, order)) if is_number(order.trim()) => is_path(name),
-            _ => is_path(differentiated),
-        };
-    }
-    is_path(name)
-}
-
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit())
-}
-
-/// Whether this is a sequence of names, with or without indices, separated by dots.
-fn is_path(mut rest: &str) -> bool {
-    loop {
-        rest = match rest.strip_prefix('\'') {
-            Some(quoted) => {
-                let mut escaped = false;
-                let end = quoted.find(|c| {
-                    let ends = c == '\'' && !escaped;
-                    escaped = c == '\\' && !escaped;
-                    ends
-                });
-                match end {
-                    Some(end) if end > 0 => &quoted[end + 1..],
-                    _ => return false,
-                }
-            }
-            None => {
-                let end = rest.find(['[', '.']).unwrap_or(rest.len());
-                if !is_c_identifier(&rest[..end]) {
-                    return false;
-                }
-                &rest[end..]
-            }
-        };
-        if let Some(indices) = rest.strip_prefix('[') {
-            let Some((indices, behind)) = indices.split_once(']') else { return false };
-            if !indices.split(',').all(is_number) {
-                return false;
-            }
-            rest = behind;
-        }
-        match rest.strip_prefix('.') {
-            Some(behind) => rest = behind,
-            None => return rest.is_empty(),
-        }
-    }
 }
 
 fn is_positive(value: f64) -> bool {

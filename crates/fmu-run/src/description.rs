@@ -155,7 +155,10 @@ impl Description {
             };
             return Err(why.to_owned());
         }
-        if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
+        let prevents_runs = |(fault, _): &&(Fault, String)| {
+            matches!(fault, Fault::Attribute | Fault::Reference | Fault::Type | Fault::Value)
+        };
+        if let Some((_, why)) = written.faults.iter().find(prevents_runs) {
             return Err(format!("modelDescription.xml: {why}"));
         }
         let mut sizes = written.derivatives.iter().map(|of| written.variables[of.variable].size);

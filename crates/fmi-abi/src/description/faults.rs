@@ -18,6 +18,17 @@ pub enum Fault {
     Type,
     /// `ModelStructure` or the attribute `derivative` refers to a variable that does not exist, or does not fit together.
     Structure,
+    /// Two units have one name, of which the last one counts.
+    Unit,
+    /// Two types, or two items of a type, have one name or value; or a variable and its declared type have other base types.
+    Definition,
+    /// The size of an array is a variable that is neither a structural parameter nor a constant of type UInt64.
+    Dimension,
+    /// `ModelStructure` lists a variable twice, of which the first entry counts, has `dependenciesKind` without a dependency for each, or an
+    /// event indicator that is not a continuous floating-point number.
+    Unknown,
+    /// The tolerance of the default experiment is negative. It counts as missing.
+    Experiment,
     /// The value of an attribute is not of the attribute's type. The attribute counts as missing.
     Value,
 }

@@ -65,6 +65,8 @@ pub struct ModelDescription {
     pub types: BTreeSet<String>,
     /// Enumerations by name, each with the names and numbers of its items.
     pub enumerations: BTreeMap<String, Vec<(String, i64)>>,
+    /// Whether the names of variables are structured (`variableNamingConvention`).
+    pub structured_names: bool,
     /// Faults, each with a message.
     pub faults: Vec<(Fault, String)>,
 }

@@ -6,10 +6,10 @@ mod variables;
 
 use super::faults::{Fault, Faults};
 use super::{ModelDescription, Offer};
-use crate::{BaseType, Standard, shown};
+use crate::{BaseType, Standard, shown, shown_number};
 use definitions::{enumeration, unit};
 use roxmltree::Node;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use variables::variables;
 
 impl ModelDescription {
@@ -61,6 +61,19 @@ impl ModelDescription {
         let experiment = child(root, "DefaultExperiment");
         let time = |name: &str| -> Option<f64> { faults.read(experiment?, name) };
         let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
+        let tolerance = time("tolerance");
+        if let Some(tolerance) = tolerance.filter(|tolerance| *tolerance < 0.0) {
+            faults
+                .add(Fault::Experiment, || format!("the tolerance {} is negative", shown_number(tolerance)));
+        }
+        let unique = |list, fault, what: &str| {
+            let mut known = HashSet::new();
+            for name in named(list).filter(|name| !known.insert(name.clone())) {
+                faults.add(fault, || format!("two {what} are called {}", shown(&name)));
+            }
+        };
+        unique("UnitDefinitions", Fault::Unit, "units");
+        unique("TypeDefinitions", Fault::Definition, "types");
         let (variables, positions) = variables(root, standard, structure, &faults)?;
         let types = || elements(root, "TypeDefinitions");
         let mut description = Self {
@@ -72,8 +85,7 @@ impl ModelDescription {
             model_exchange,
             scheduled_execution: child(root, "ScheduledExecution").is_some(),
             default_experiment: ["startTime", "stopTime", "stepSize"].map(time),
-            default_tolerance: time("tolerance")
-                .filter(|tolerance| tolerance.is_finite() && *tolerance > 0.0),
+            default_tolerance: tolerance.filter(|tolerance| tolerance.is_finite() && *tolerance > 0.0),
             variables,
             outputs: Vec::new(),
             derivatives: Vec::new(),
@@ -83,6 +95,7 @@ impl ModelDescription {
             units: elements(root, "UnitDefinitions").map(|node| unit(node, &faults)).collect(),
             types: named("TypeDefinitions").collect(),
             enumerations: types().filter_map(|node| enumeration(node, &faults)).collect(),
+            structured_names: root.attribute("variableNamingConvention").map(str::trim) == Some("structured"),
             faults: Vec::new(),
         };
         description.structure(root, &positions, &faults);

@@ -4,7 +4,7 @@ use super::variables::Positions;
 use super::{child, elements};
 use crate::description::faults::{Fault, Faults};
 use crate::description::{ModelDescription, Unknown};
-use crate::{DependencyKind, Standard};
+use crate::{DependencyKind, Standard, Variability, shown};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 
@@ -31,8 +31,15 @@ impl ModelDescription {
             let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
             // Only the first entry of a variable counts.
             let mut known = HashSet::new();
-            let new = |node| unknown(node, attribute, &find, faults);
-            let mut new = |node| new(node).filter(|unknown: &Unknown| known.insert(unknown.variable));
+            let mut new = |node| {
+                let unknown = unknown(node, attribute, &find, faults)?;
+                let is_new = known.insert(unknown.variable);
+                if !is_new {
+                    let name = shown(&self.variables[unknown.variable].name);
+                    faults.add(Fault::Unknown, || format!("ModelStructure lists {name} twice as {of_fmi3}"));
+                }
+                is_new.then_some(unknown)
+            };
             match standard {
                 Standard::Fmi2 => elements(structure, group).filter_map(&mut new).collect(),
                 Standard::Fmi3 => {
@@ -41,10 +48,19 @@ impl ModelDescription {
                 }
             }
         };
-        self.outputs = list("Outputs", "Output");
-        self.derivatives = list("Derivatives", "ContinuousStateDerivative");
-        self.initial_unknowns = list("InitialUnknowns", "InitialUnknown");
+        let outputs = list("Outputs", "Output");
+        let derivatives = list("Derivatives", "ContinuousStateDerivative");
+        let initial_unknowns = list("InitialUnknowns", "InitialUnknown");
         let indicators = list("", "EventIndicator");
+        for indicator in &indicators {
+            let variable = &self.variables[indicator.variable];
+            if !variable.is_float() || variable.variability != Variability::Continuous {
+                let name = shown(&variable.name);
+                let why = || format!("the event indicator {name} is not a continuous floating-point number");
+                faults.add(Fault::Unknown, why);
+            }
+        }
+        (self.outputs, self.derivatives, self.initial_unknowns) = (outputs, derivatives, initial_unknowns);
         self.event_indicators = match standard {
             Standard::Fmi2 if root.has_attribute("numberOfEventIndicators") => {
                 faults.read(root, "numberOfEventIndicators")
@@ -73,6 +89,16 @@ fn unknown(
     let dependencies: Option<Vec<u32>> = faults.read_list(node, "dependencies");
     let dependencies =
         dependencies.and_then(|list| list.into_iter().map(find).collect::<Option<Vec<usize>>>());
+    let listed = |name: &str| node.attribute(name).map(|list| list.split_ascii_whitespace().count());
+    if let (Some(kinds), count) = (listed("dependenciesKind"), listed("dependencies"))
+        && count != Some(kinds)
+    {
+        let why = || {
+            let count = count.map_or("no dependencies".to_owned(), |count| format!("{count} dependencies"));
+            format!("an {kind} of ModelStructure has {kinds} dependenciesKind, but {count}")
+        };
+        faults.add(Fault::Unknown, why);
+    }
     let mut kinds: Vec<DependencyKind> = faults.read_list(node, "dependenciesKind").unwrap_or_default();
     if dependencies.as_ref().is_none_or(|list| list.len() != kinds.len()) {
         kinds.clear();

@@ -7,7 +7,7 @@ use crate::description::faults::{Fault, Faults};
 use crate::description::{Alias, MAX_VALUES, Variable};
 use crate::{BaseType, Causality, Initial, Standard, Variability, shown};
 use roxmltree::Node;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Upper bounds for the memory that a variable and a value in a list take, in bytes.
@@ -33,19 +33,22 @@ pub(super) fn variables(
     faults: &Faults,
 ) -> Result<(Vec<Variable>, Positions), String> {
     let types: HashMap<&str, Declared> = elements(root, "TypeDefinitions")
-        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node, faults))))
+        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node, standard, faults))))
         .collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
     reserve(root, &nodes)?;
     let quiet = |node: Node, name: &str| value(node, name).and_then(Result::ok);
+    let reference = |node: &Node| u32::try_from(quiet(*node, "valueReference")?).ok();
     // Start values of structural parameters, which are sizes.
-    let starts: HashMap<u32, Option<usize>> = nodes
-        .iter()
-        .rev()
-        .filter_map(|node| {
-            Some((u32::try_from(quiet(*node, "valueReference")?).ok()?, quiet(*node, "start")))
-        })
-        .collect();
+    let starts: HashMap<u32, Option<usize>> =
+        nodes.iter().rev().filter_map(|node| Some((reference(node)?, quiet(*node, "start")))).collect();
+    // Value references of the variables that may be sizes (section 2.4.7.2 of FMI 3.0).
+    let is_size = |node: &&Node| {
+        let is = |name, value| node.attribute(name).map(str::trim) == Some(value);
+        node.has_tag_name("UInt64")
+            && (is("causality", "structuralParameter") || is("variability", "constant"))
+    };
+    let sizes: HashSet<u32> = nodes.iter().filter(is_size).filter_map(reference).collect();
     let (mut found, mut positions) = (Vec::new(), Positions(Vec::with_capacity(nodes.len())));
     let mut derivatives = Vec::new();
     let mut remaining = MAX_VALUES;
@@ -73,10 +76,22 @@ pub(super) fn variables(
         };
         positions.0.push(Some(found.len()));
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
+        let base = of_type.tag_name().name();
+        if let Some(other) = declared.map(|declared| declared.base).filter(|other| *other != base) {
+            faults.add(Fault::Definition, || {
+                format!("{} is of type {base}, but its declaredType is of type {}", named(), shown(other))
+            });
+        }
         // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
         let size = |dimension: Node| {
             faults.read(dimension, "start").or_else(|| {
                 let parameter = faults.read(dimension, "valueReference")?;
+                if !sizes.contains(&parameter) {
+                    faults.add(Fault::Dimension, || {
+                        let what = "which is neither a structural parameter nor a constant of type UInt64";
+                        format!("the size of {} is the variable {parameter}, {what}", named())
+                    });
+                }
                 structure.get(&parameter).copied().or_else(|| *starts.get(&parameter)?)
             })
         };
