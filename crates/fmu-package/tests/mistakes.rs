@@ -6,6 +6,7 @@
 
 use fmu_test_kit::c_programs::library;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
@@ -194,4 +195,96 @@ fn derivatives_equal_differences_of_the_values() {
 fn values_follow_from_the_variables_that_they_name() {
     rejects("square", "hidden", "2", &["y ", " v changes", "name it in the `depends_on`"]);
     rejects("square", "not finite", "3", &["y is not a finite number"]);
+}
+
+/// A motion in which the fuse trips, beside an FMU of it, which the build has accepted.
+struct Motion(TempDir, &'static str);
+
+impl Motion {
+    fn new(fmi: &'static str) -> Self {
+        let directory = package("fuse");
+        let (is_built, errors) = build(directory.path(), "fuse", "", fmi);
+        assert!(is_built, "{errors}");
+        fs::write(directory.path().join("current.csv"), "time,u\n0,0\n1,0\n1,1\n20,1\n").unwrap();
+        Self(directory, if fmi == "2" { "out/fuse.fmu" } else { "out/fmi3/fuse.fmu" })
+    }
+
+    /// Examines the FMU with a mistake. Returns whether the check accepts it, and what it prints.
+    fn examined(&self, mistake: &str) -> (bool, String) {
+        let path = |name: &str| self.0.path().join(name);
+        let mut fmu = zip::ZipArchive::new(fs::File::open(path(self.1)).unwrap()).unwrap();
+        let mut with_mistake = zip::ZipWriter::new(fs::File::create(path("fuse.fmu")).unwrap());
+        for index in 0..fmu.len() {
+            let file = fmu.by_index_raw(index).unwrap();
+            if file.name().unwrap() != "resources/mistake" {
+                with_mistake.raw_copy_file(file).unwrap();
+            }
+        }
+        with_mistake.start_file("resources/mistake", zip::write::SimpleFileOptions::default()).unwrap();
+        with_mistake.write_all(mistake.as_bytes()).unwrap();
+        with_mistake.finish().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
+        command.args([
+            "fmu",
+            "check",
+            "--only",
+            "description",
+            "--input",
+            "current.csv",
+            "--fmu",
+            "fuse.fmu",
+        ]);
+        let output = command.current_dir(self.0.path()).output().unwrap();
+        (output.status.success(), String::from_utf8(output.stdout).unwrap())
+    }
+
+    #[track_caller]
+    fn shows(&self, mistake: &str, parts: &[&str]) {
+        let (is_accepted, output) = self.examined(mistake);
+        assert!(!is_accepted && parts.iter().all(|part| output.contains(part)), "{mistake:?}: {output}");
+    }
+
+    #[track_caller]
+    fn shows_nothing(&self) {
+        let (is_accepted, output) = self.examined("");
+        let found: Vec<&str> = output.lines().filter(|line| line.starts_with("fuse.fmu: ")).collect();
+        assert!(is_accepted && matches!(found[..], [only] if only.contains(AGREE)), "{output}");
+    }
+}
+
+const AGREE: &str = "Co-Simulation and Model Exchange agree";
+
+#[test]
+fn the_motion_of_the_author_shows_mistakes_in_events() {
+    let motion = Motion::new("2");
+    motion.shows_nothing();
+    motion.shows("unreported", &["changes the state x, but does not report it", "`states_changed: true`"]);
+    motion.shows("wear", &["changes the state wear; add `.reinit()`"]);
+    motion.shows("warm", &["warm changes from false to true before ", ", without an event", AGREE]);
+    motion.shows(
+        "next",
+        &["a run that continues from the state saved at ", "sample is ", "`memory in`", AGREE],
+    );
+    motion.shows("clone", &["a run that continues from the state saved at ", "tripped is ", "`Clone`"]);
+}
+
+#[test]
+#[ignore = "make test-long runs it"]
+fn the_motion_of_the_author_shows_further_mistakes() {
+    let motion = Motion::new("3");
+    motion.shows_nothing();
+    motion.shows("tripped", &["tripped is ", "`memory in`"]);
+    motion.shows(
+        "static",
+        &[
+            "two runs with the same inputs differ: noise is ",
+            "`static`",
+            "two runs of Co-Simulation differ as well",
+        ],
+    );
+    motion.shows(
+        "unannounced",
+        &["differ from 10.501 s on: sample is ", "Model Exchange has no event", "`next`"],
+    );
+    motion.shows("erratic", &["differ from ", " s on: noise is "]);
 }

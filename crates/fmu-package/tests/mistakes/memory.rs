@@ -1,31 +1,12 @@
 //! A model whose saved states lack one of the fields that it remembers.
 #![allow(missing_docs, unsafe_code)]
 
+mod field;
 mod mistake;
 
+use field::Field;
 use fmu_export::*;
 use mistake::{mistake, read_mistake};
-
-/// A field that is missing in saved states if the mistake has its name.
-#[derive(Clone)]
-struct Field<T> {
-    name: &'static str,
-    value: T,
-}
-
-impl<T> Field<T> {
-    fn new(name: &'static str, value: T) -> Self {
-        Self { name, value }
-    }
-}
-
-impl<T: Saved> Saved for Field<T> {
-    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
-        if mistake() != self.name {
-            self.value.visit(visitor);
-        }
-    }
-}
 
 /// Remembers the integral of its input, the last input, its output, the step size and the number of events. It also has a copy of the
 /// gain, which needs no memory because `update` restores it.

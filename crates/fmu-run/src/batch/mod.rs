@@ -192,6 +192,10 @@ pub struct Occurrence {
     pub before: Vec<f64>,
     /// The same outputs after the event.
     pub after: Vec<f64>,
+    /// Indices of the continuous states that the event has changed.
+    pub states: Vec<usize>,
+    /// Whether the FMU has reported that states have changed.
+    pub states_changed: bool,
 }
 
 impl System {

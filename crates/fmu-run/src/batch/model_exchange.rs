@@ -5,7 +5,7 @@ use super::model_exchange_plan::ModelExchangePlan;
 use super::worker::{Kept, Stopped, Worker};
 use crate::continuous::{Hooks, Model, Simulation, Solver};
 use crate::system_instance::SystemInstance;
-use fmi_abi::client::Rejection;
+use fmi_abi::client::{Continuous, Rejection};
 
 impl<'a> Worker<'a> {
     /// Runs an instance in Model Exchange from the start values to the last time. `follow` is its counterpart in Co-Simulation.
@@ -34,7 +34,7 @@ impl<'a> Worker<'a> {
         let sizes = [description.states, description.event_indicators];
         let mut simulation = Simulation::new(times, sizes, integration, *rtol, *reports_steps);
         let mut kept = Kept::of(plan);
-        let mut observed = Observed { worker: self, times, trajectories, kept: &mut kept, run, before: None };
+        let mut observed = Observed { worker: self, times, trajectories, kept: &mut kept, run, event: None };
         let result = simulation.run(&model, &mut observed);
         result.map_err(|rejection| {
             if let Some(end) = rejection.ended() {
@@ -74,8 +74,15 @@ struct Observed<'w, 'a> {
     trajectories: &'w mut [f64],
     kept: &'w mut Kept,
     run: usize,
-    /// Outputs before an event.
-    before: Option<Vec<f64>>,
+    /// The current event, without the outputs after it.
+    event: Option<Occurrence>,
+}
+
+impl Observed<'_, '_> {
+    fn keeps_events(&self) -> bool {
+        self.worker.plan.model_exchange.as_ref().is_some_and(|of| of.keeps_events)
+            && !self.worker.is_repeated()
+    }
 }
 
 impl Hooks for Observed<'_, '_> {
@@ -93,17 +100,32 @@ impl Hooks for Observed<'_, '_> {
     }
 
     fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection> {
-        let plan = self.worker.plan;
-        if plan.model_exchange.as_ref().is_none_or(|of| !of.keeps_events) || self.worker.is_repeated() {
+        if !self.keeps_events() {
             return Ok(());
         }
-        let mut row = vec![0.0; plan.outputs.len()];
-        instance.get(&plan.outputs, &mut row)?;
+        let outputs = &self.worker.plan.outputs;
+        let mut row = vec![0.0; outputs.len()];
+        instance.get(outputs, &mut row)?;
         if !is_after {
-            self.before = Some(row);
-        } else if let Some(before) = self.before.take() {
-            self.worker.events.push(Occurrence { run: self.run, time, before, after: row });
+            let (states, states_changed) = (Vec::new(), false);
+            let event =
+                Occurrence { run: self.run, time, before: row, after: Vec::new(), states, states_changed };
+            self.event = Some(event);
+        } else if let Some(event) = self.event.take() {
+            self.worker.events.push(Occurrence { after: row, ..event });
         }
+        Ok(())
+    }
+
+    fn updated(&mut self, instance: &mut SystemInstance, x: &[f64], reported: bool) -> Result<(), Rejection> {
+        let Some(event) = &mut self.event else { return Ok(()) };
+        event.states_changed |= reported;
+        let mut after = vec![0.0; x.len()];
+        if !x.is_empty() {
+            instance.sole().get_continuous(Continuous::States, &mut after)?;
+        }
+        let changed = (0..x.len()).filter(|state| after[*state] != x[*state]);
+        event.states.extend(changed);
         Ok(())
     }
 

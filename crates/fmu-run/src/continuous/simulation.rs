@@ -21,6 +21,10 @@ pub(crate) trait Hooks {
     /// is not an event, it is only called with `is_after` false.
     fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection>;
 
+    /// Called in an event after the FMU has updated its discrete states, before the states are read. `x` are the states before, and
+    /// `reported` is whether the FMU reports that they have changed.
+    fn updated(&mut self, instance: &mut SystemInstance, x: &[f64], reported: bool) -> Result<(), Rejection>;
+
     /// Returns whether a string, bytes or a 64-bit integer among the inputs changes at this communication point.
     fn changes(&self, index: usize) -> bool;
 
@@ -109,7 +113,7 @@ impl<'a> Simulation<'a> {
 
     /// Performs the run, from the end of Initialization Mode. Returns early if the caller cancels it.
     pub fn run(&mut self, model: &Model, hooks: &mut impl Hooks) -> Result<(), Rejection> {
-        self.update(model, true)?;
+        self.update(model, hooks, true)?;
         loop {
             let is_end = self.next + 1 >= self.times.len();
             if self.times[self.next] <= self.time {
@@ -216,34 +220,42 @@ impl<'a> Simulation<'a> {
                 hooks.set_exact(parts.instance, self.next)?;
             }
         }
-        let changes = self.update(model, false)?;
+        let changes = self.update(model, hooks, false)?;
         hooks.event(model.parts().observe(self.time, &self.x)?, self.time, true)?;
         Ok(changes)
     }
 
     /// Handles an event in Event Mode, and the further events that the FMU announces for the same time, because values between them
     /// belong to no time. Returns whether states or their nominal values have changed.
-    fn update(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
-        let mut changes = self.update_once(model, is_first)?;
+    fn update(&mut self, model: &Model, hooks: &mut impl Hooks, is_first: bool) -> Result<bool, Rejection> {
+        let mut changes = self.update_once(model, hooks, is_first)?;
         while self.event.is_some_and(|next| next <= self.time) {
             let scale = self.scale();
             if let Some(since) = self.chatter.count(self.time, scale) {
                 return Err(self.chattering(Arrival::Stop, since));
             }
             model.parts().instance.sole().enter_event_mode()?;
-            changes |= self.update_once(model, false)?;
+            changes |= self.update_once(model, hooks, false)?;
         }
         Ok(changes)
     }
 
     /// Updates the discrete states in Event Mode until the event is complete, enters Continuous-Time Mode and reads the values that
     /// have changed. Returns whether states or their nominal values have changed.
-    fn update_once(&mut self, model: &Model, is_first: bool) -> Result<bool, Rejection> {
+    fn update_once(
+        &mut self,
+        model: &Model,
+        hooks: &mut impl Hooks,
+        is_first: bool,
+    ) -> Result<bool, Rejection> {
         let mut parts = model.parts();
         let event = parts.instance.sole().event()?;
         if event.terminate {
             drop(parts);
             return Err(self.ended(model));
+        }
+        if !is_first {
+            hooks.updated(parts.instance, &self.x, event.states_changed)?;
         }
         parts.instance.sole().enter_continuous_time_mode()?;
         if event.states_changed || is_first {

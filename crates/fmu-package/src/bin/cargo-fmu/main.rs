@@ -1,7 +1,7 @@
 //! The program behind `cargo fmu`, which the README of the crate describes.
 //!
 //! `new` creates a model, `project` gets the metadata of a package from cargo, and `builder` builds the FMUs, which
-//! `judge` accepts or rejects. `run` simulates an FMU with the inputs that `inputs` reads, for which `motion` compares the interface types,
+//! `judge` accepts or rejects. `run` simulates an FMU with the inputs that `inputs` reads, for which `motion` compares the interface types and looks for other mistakes,
 //! `results` writes the table of results, and `plot` draws it.
 
 mod builder;

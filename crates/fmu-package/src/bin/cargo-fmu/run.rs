@@ -2,7 +2,7 @@
 
 use crate::builder::{self, Purpose};
 use crate::inputs::{Table, is_exact, named, value};
-use crate::motion::{Comparison, Motion, compare};
+use crate::motion::{Comparison, Motion, examine};
 use crate::plot::plot;
 use crate::project::{Package, Project};
 use crate::results::{Column, write_table};
@@ -133,19 +133,21 @@ pub fn check(
     Ok(good)
 }
 
-/// Returns whether both interface types of an FMU have the same results for the inputs in a file. Prints the result.
+/// Returns whether both interface types of an FMU have the same results for the inputs in a file, and no other mistake shows. Prints the
+/// results.
 fn agrees(path: &Path, input: &Path) -> Result<bool> {
     // SAFETY: the user asks to run this FMU, which the check has executed before.
     #[allow(unsafe_code)]
     let fmu = unsafe { Fmu::open(path) }?;
     let table = Table::read(input, fmu.description())?;
     let time = times([None; 2], fmu.description(), Some(&table))?;
-    let Some(comparison) = compare(&fmu, &Motion { time: &time, table: &table, starts: &[] })? else {
-        println!("{}: it has only one interface type, so --input compares nothing", short(path));
-        return Ok(true);
-    };
-    println!("{}: {comparison}", short(path));
-    Ok(matches!(comparison, Comparison::Agree(_)))
+    let found = examine(&fmu, &Motion { time: &time, table: &table, starts: &[] })?;
+    match &found.comparison {
+        Some(comparison) => println!("{}: {comparison}", short(path)),
+        None => println!("{}: there is only one interface type, so --input compares nothing", short(path)),
+    }
+    found.mistakes.iter().for_each(|mistake| println!("{}: {mistake}", short(path)));
+    Ok(found.mistakes.is_empty() && !matches!(found.comparison, Some(Comparison::Differ(_))))
 }
 
 fn once(options: &Options) -> Result<bool> {
@@ -246,10 +248,15 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
         println!("{note}");
     }
     if let Some(table) = table.as_ref().filter(|_| !failed) {
-        match compare(&fmu, &Motion { time: &points, table, starts: &starts }) {
-            Ok(Some(result @ Comparison::Agree(_))) => println!("{result}"),
-            Ok(Some(result @ Comparison::Differ(_))) => println!("warning: {result}"),
-            Ok(None) => {}
+        match examine(&fmu, &Motion { time: &points, table, starts: &starts }) {
+            Ok(found) => {
+                match found.comparison {
+                    Some(agree @ Comparison::Agree(_)) => println!("{agree}"),
+                    Some(differ) => println!("warning: {differ}"),
+                    None => {}
+                }
+                found.mistakes.iter().for_each(|mistake| println!("warning: {mistake}"));
+            }
             Err(error) => println!("Co-Simulation and Model Exchange cannot be compared: {error:#}"),
         }
     }

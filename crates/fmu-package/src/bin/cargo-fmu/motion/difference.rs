@@ -1,28 +1,16 @@
-//! Compares Co-Simulation with Model Exchange of an FMU that the author has made, on the author's own motion.
-//!
-//! The comparison at the default inputs, which `cargo fmu build` makes, cannot find mistakes in events that do not occur there.
+//! Compares the results of Co-Simulation with those of Model Exchange.
 
-use crate::inputs::{Table, is_exact};
-use anyhow::Result;
+use super::Run;
 use fmi_abi::Causality;
-use fmu_run::{
-    BaseType, Batch, Description, Fmu, Integration, Interface, Occurrence, Runs, Start, Trajectory, Value,
-    Variable, Watch,
-};
-use std::collections::HashSet;
+use fmu_run::{BaseType, Description, Occurrence, Variable};
 use std::fmt;
-
-/// A motion: communication points, inputs and start values.
-pub struct Motion<'a> {
-    pub time: &'a [f64],
-    pub table: &'a Table,
-    pub starts: &'a [(String, Value)],
-}
 
 /// Result of a comparison.
 pub enum Comparison {
     /// The largest difference: a variable with its unit, the difference and the time.
     Agree(Option<(String, f64, f64)>),
+    /// Differences that are larger, but not larger than the errors of the steps.
+    Coarse(String),
     /// What differs first, and a possible reason.
     Differ(String),
 }
@@ -35,146 +23,36 @@ impl fmt::Display for Comparison {
             Self::Agree(Some((name, difference, time))) => {
                 write!(f, "{equal}: {name} differs most, by {difference:.1e} at {time} s")
             }
-            Self::Differ(text) => write!(f, "Co-Simulation and Model Exchange differ {text}"),
+            Self::Coarse(text) | Self::Differ(text) => {
+                write!(f, "Co-Simulation and Model Exchange differ {text}")
+            }
         }
     }
 }
 
 /// Largest difference, relative to the range of a variable, that may be an error of a solver.
 const TOLERANCE: f64 = 1e-3;
-/// Relative tolerance of the integration of Model Exchange.
-const RTOL: f64 = 1e-8;
-
-/// Values of the variables in a run, and when the FMU has ended it.
-struct Run {
-    /// For each variable, a value at each time; NaN after the end of the run.
-    values: Vec<Vec<f64>>,
-    ended: Option<f64>,
-    events: Vec<Occurrence>,
-    error: Option<String>,
-}
-
-/// Compares the interface types. Returns `None` if the FMU has only one, or no variable that can be compared.
-pub fn compare(fmu: &Fmu, motion: &Motion) -> Result<Option<Comparison>> {
-    let description = fmu.description();
-    let has = |interface| description.offer(interface).is_some();
-    let compared = compared(description);
-    if !has(Interface::CoSimulation) || !has(Interface::ModelExchange) || compared.is_empty() {
-        return Ok(None);
-    }
-    let moved: Vec<_> = motion.table.trajectories();
-    let is_number = |name: &str| description.variable(name).is_some_and(|variable| !is_exact(variable));
-    let numeric: Vec<&str> = moved.iter().map(|(name, _)| *name).filter(|name| is_number(name)).collect();
-    // The inputs are read, too, because Co-Simulation holds the values that they have at the communication points.
-    let names: Vec<&str> =
-        compared.iter().map(|variable| variable.name.as_str()).chain(numeric.iter().copied()).collect();
-    let run = |interface, time: &[f64], inputs: &[(&str, Trajectory)], outputs: &[&str]| -> Result<Run> {
-        let integrates = interface == Interface::ModelExchange;
-        let batch = Batch {
-            time,
-            inputs: inputs.to_vec(),
-            start: motion.starts.iter().map(|(name, value)| (name.as_str(), Start::Value(value))).collect(),
-            outputs: outputs.to_vec(),
-            every: Some(1),
-            threads: Some(1),
-            interface: Some(interface),
-            integration: Integration { rtol: Some(RTOL).filter(|_| integrates), ..Integration::default() },
-            events: integrates,
-            ..Batch::default()
-        };
-        let watch = Watch::listening();
-        let Runs { trajectories, errors, events, .. } = fmu.system().run(&batch, &watch)?;
-        let ended = watch.ended().pop().map(|(_, end, _)| end);
-        let error = errors.into_iter().next().map(|(_, reason)| reason).filter(|_| ended.is_none());
-        Ok(Run {
-            values: trajectories.chunks(time.len()).map(<[f64]>::to_vec).collect(),
-            ended,
-            events,
-            error,
-        })
-    };
-    let time = motion.time;
-    let stepped = run(Interface::CoSimulation, time, &moved, &names)?;
-    let (times, held) = held(time, &stepped.values[compared.len()..]);
-    let mut staircase = moved.clone();
-    for (name, trajectory) in &mut staircase {
-        if let Some(number) = numeric.iter().position(|other| other == name) {
-            *trajectory = Trajectory::Sampled { times: &times, values: &held[number] };
-        }
-    }
-    let names = &names[..compared.len()];
-    let integrated = run(Interface::ModelExchange, time, &staircase, names)?;
-    // A model may interpolate its inputs in Co-Simulation.
-    let lines = run(Interface::ModelExchange, time, &moved, names)?;
-    // Results of half the step size show the error of the steps. A model may reject other step sizes.
-    let halves: Vec<f64> = time.windows(2).flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]).collect();
-    let halves = [&halves[..], &time[time.len() - 1..]].concat();
-    let half = run(Interface::CoSimulation, &halves, &staircase, names)?;
-    let judged =
-        Judged { time, compared: &compared, stepped, integrated, lines, half, description, moved: &numeric };
-    Ok(Some(judged.comparison()))
-}
-
-/// Returns the variables that are compared: outputs and states.
-fn compared(description: &Description) -> Vec<&Variable> {
-    let variables = &description.variables;
-    let derivatives = variables.iter().filter(|of| of.causality != Causality::Input);
-    let states: HashSet<usize> = derivatives.filter_map(|of| of.derivative_of).collect();
-    let is_compared = |(index, of): &(usize, &Variable)| {
-        !is_exact(of)
-            && (of.causality == Causality::Output
-                || of.causality == Causality::Local && states.contains(index))
-    };
-    variables.iter().enumerate().filter(is_compared).map(|(_, of)| of).collect()
-}
-
-/// Returns the inputs as Co-Simulation holds them, with a jump at each communication point.
-fn held(time: &[f64], inputs: &[Vec<f64>]) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let twice = |values: &[f64]| values.iter().flat_map(|value| [*value; 2]).collect::<Vec<f64>>();
-    let times = twice(time)[1..].to_vec();
-    // Values after the end of a run are unknown, and not used.
-    let known = |values: &Vec<f64>| {
-        let mut last = 0.0;
-        values
-            .iter()
-            .map(|value| {
-                if value.is_finite() {
-                    last = *value;
-                }
-                last
-            })
-            .collect::<Vec<f64>>()
-    };
-    (
-        times,
-        inputs
-            .iter()
-            .map(|values| {
-                let mut values = twice(&known(values));
-                values.pop();
-                values
-            })
-            .collect(),
-    )
-}
 
 /// Results of the runs of both interface types.
-struct Judged<'a> {
-    time: &'a [f64],
-    compared: &'a [&'a Variable],
-    stepped: Run,
+pub(super) struct Judged<'a> {
+    pub time: &'a [f64],
+    pub compared: &'a [&'a Variable],
+    pub stepped: Run,
     /// Model Exchange with the inputs of Co-Simulation, which are held between communication points.
-    integrated: Run,
+    pub integrated: Run,
     /// Model Exchange with continuous inputs that follow lines.
-    lines: Run,
+    pub lines: Run,
     /// Co-Simulation with half the step size.
-    half: Run,
-    description: &'a Description,
-    moved: &'a [&'a str],
+    pub half: Run,
+    pub description: &'a Description,
+    /// The numeric inputs in the table.
+    pub moved: &'a [&'a str],
+    /// Whether two runs with the same inputs differ.
+    pub is_random: bool,
 }
 
 impl Judged<'_> {
-    fn comparison(&self) -> Comparison {
+    pub fn comparison(&self) -> Comparison {
         for (run, name) in [(&self.stepped, "Co-Simulation"), (&self.integrated, "Model Exchange")] {
             if let Some(error) = &run.error {
                 return Comparison::Differ(format!("because {name} fails: {error}"));
@@ -186,13 +64,7 @@ impl Judged<'_> {
             one.cmp(other).then(self.share(*other, *b).total_cmp(&self.share(*one, *a)))
         });
         if let Some((at, of)) = first {
-            let [stepped, integrated] =
-                [&self.stepped, &self.integrated].map(|run| self.shown(of, run.values[of][at]));
-            let (name, time) = (&self.compared[of].name, self.time[at]);
-            return Comparison::Differ(format!(
-                "from {time} s on: {name} is {stepped} in Co-Simulation and {integrated} in Model Exchange; {}",
-                self.reason(at, of)
-            ));
+            return self.parted(at, of);
         }
         let [stepped, integrated] = [&self.stepped, &self.integrated].map(|run| run.ended);
         let step = self.time[1] - self.time[0];
@@ -215,9 +87,47 @@ impl Judged<'_> {
             Some((difference / self.range(of), of, difference, at))
         });
         let most = most.max_by(|one, other| one.0.total_cmp(&other.0)).filter(|most| most.0 > 0.0);
-        Comparison::Agree(
-            most.map(|(_, of, difference, at)| (self.compared[of].name.clone(), difference, self.time[at])),
-        )
+        match most {
+            Some((share, of, difference, at)) if share > TOLERANCE => match self.converges(of) {
+                true => Comparison::Coarse(format!(
+                    "by up to {difference:.1e} in {}, at {} s, which is {:.1} % of its range, and by less with half the step size; choose \
+                     shorter steps to compare",
+                    self.compared[of].name,
+                    self.time[at],
+                    100.0 * share
+                )),
+                false => self.parted(self.first(of).unwrap_or(at), of),
+            },
+            _ => {
+                Comparison::Agree(most.map(|(_, of, difference, at)| {
+                    (self.compared[of].name.clone(), difference, self.time[at])
+                }))
+            }
+        }
+    }
+
+    /// Returns the index of the first time at which the difference of a variable exceeds the tolerance.
+    fn first(&self, of: usize) -> Option<usize> {
+        self.indices(of).find(|at| self.share(*at, of) > TOLERANCE)
+    }
+
+    /// Describes the difference of a variable at a time.
+    fn parted(&self, at: usize, of: usize) -> Comparison {
+        let [stepped, integrated] =
+            [&self.stepped, &self.integrated].map(|run| self.shown(of, run.values[of][at]));
+        let (name, time) = (&self.compared[of].name, self.time[at]);
+        Comparison::Differ(format!(
+            "from {time} s on: {name} is {stepped} in Co-Simulation and {integrated} in Model Exchange; {}",
+            self.reason(at, of)
+        ))
+    }
+
+    /// Returns whether half the step size reduces the differences of a variable as much as a method of first order does, or more.
+    fn converges(&self, of: usize) -> bool {
+        let of_half = |at: usize| self.distance(at, of, self.half.values[of].get(2 * at).copied());
+        let [whole, half] = [&|at| Some(self.difference(at, of)), &of_half as &dyn Fn(usize) -> Option<f64>]
+            .map(|difference| self.indices(of).filter_map(difference).sum::<f64>());
+        half <= 0.75 * whole
     }
 
     /// Returns the difference that lasts from one time to the next. At a single time, an event near it may be handled before it in one
@@ -233,10 +143,14 @@ impl Judged<'_> {
     }
 
     fn difference(&self, at: usize, of: usize) -> f64 {
-        let stepped = self.stepped.values[of][at];
-        let lines = self.lines.values[of][at];
-        let held = (stepped - self.integrated.values[of][at]).abs();
-        if lines.is_finite() { held.min((stepped - lines).abs()) } else { held }
+        self.distance(at, of, Some(self.stepped.values[of][at])).unwrap_or(f64::NAN)
+    }
+
+    /// Returns the distance of a value from the nearest result of Model Exchange.
+    fn distance(&self, at: usize, of: usize, value: Option<f64>) -> Option<f64> {
+        let value = value.filter(|value| value.is_finite())?;
+        let results = [&self.integrated, &self.lines].map(|run| (value - run.values[of][at]).abs());
+        results.into_iter().filter(|distance| distance.is_finite()).min_by(f64::total_cmp)
     }
 
     /// Returns the range of a variable in both runs.
@@ -274,6 +188,9 @@ impl Judged<'_> {
 
     /// Returns a possible reason of a difference, as an instruction.
     fn reason(&self, at: usize, of: usize) -> String {
+        if self.is_random {
+            return "two runs of Co-Simulation differ as well".to_owned();
+        }
         let from = self.time[at.saturating_sub(2)];
         let [stepped, integrated] = [&self.stepped, &self.integrated].map(|run| &run.values[of]);
         // The times at which the results differ, and those of them at which Co-Simulation has the value that Model Exchange has a step
@@ -309,30 +226,51 @@ impl Judged<'_> {
                 event.time
             );
         }
+        let events = || self.integrated.events.iter().filter(|event| event.time > self.time[0]);
+        if events().next().is_none() && self.description.event_indicators == 0 && self.description.states == 0
+        {
+            return "Model Exchange has no event after the start: without indicators, `event` must return the time of the next event in \
+                    `next`"
+                .to_owned();
+        }
+        let near = events().filter(|event| (from..=self.time[at]).contains(&event.time)).count();
+        if near > 0 {
+            return format!(
+                "the {near} events of Model Exchange from {from} s to then change no output and no state: compare what `event` does with `step`"
+            );
+        }
         let change = |values: &[f64], at: usize| (values[at] - values[at.saturating_sub(1)]).abs();
         if at > 1 && change(stepped, at) > 10.0 * change(stepped, at - 1).max(change(integrated, at)) {
             return "Co-Simulation jumps there, and Model Exchange has no event: compare the event in `step` with `indicators`, whose \
-                    sign must change"
+                    sign must change, and with the time `next` that `event` returns"
                 .to_owned();
         }
-        let missing = self
-            .description
-            .variables
-            .iter()
-            .filter(|of| of.causality == Causality::Input && of.base == BaseType::Real);
+        let is_missing = |of: &&Variable| {
+            of.causality == Causality::Input
+                && of.base == BaseType::Real
+                && !self.moved.contains(&of.name.as_str())
+        };
         let missing: Vec<&str> =
-            missing.map(|of| of.name.as_str()).filter(|name| !self.moved.contains(name)).collect();
+            self.description.variables.iter().filter(is_missing).map(|of| of.name.as_str()).collect();
         let missing = match missing.is_empty() {
             true => String::new(),
             false => {
                 format!("; the table has no column for {}, which one of them may need", missing.join(", "))
             }
         };
-        format!("no event is near, so compare the equations of `step` with the derivatives{missing}")
+        let compare = match self.description.states {
+            0 => "compare what `step` sets with what `event` and `calculate` set",
+            _ => "compare the equations of `step` with the derivatives",
+        };
+        format!("no event is near, so {compare}{missing}")
     }
 
     fn shown(&self, of: usize, value: f64) -> String {
-        let unit = self.compared[of].unit.as_deref().map_or(String::new(), |unit| format!(" {unit}"));
+        let unit = self.compared[of]
+            .unit
+            .as_deref()
+            .filter(|unit| *unit != "1")
+            .map_or(String::new(), |unit| format!(" {unit}"));
         format!("{value}{unit}")
     }
 }
