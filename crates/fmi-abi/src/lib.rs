@@ -28,6 +28,7 @@ mod standard;
 mod status;
 mod text;
 mod unit;
+mod unit_name;
 mod value;
 #[cfg(feature = "write")]
 pub mod write;

@@ -102,6 +102,13 @@ impl BaseUnit {
         Self { offset: 0.0, ..self }
     }
 
+    /// Returns the unit without the radian, which many definitions leave out.
+    #[must_use]
+    pub fn without_radian(mut self) -> Self {
+        self.exponents[BASE_UNITS.len() - 1] = 0;
+        self
+    }
+
     /// The base units whose exponents are not 0.
     fn named(&self) -> impl Iterator<Item = (&'static str, i32)> {
         BASE_UNITS.into_iter().zip(self.exponents).filter(|(_, exponent)| *exponent != 0)

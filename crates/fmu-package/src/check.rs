@@ -197,6 +197,14 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
             other.name
         );
     }
+    if let Some(other) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')'))
+        && variable.differentiates.is_none()
+    {
+        ensure!(
+            !table.variables.iter().any(|variable| variable.name == other),
+            "{name} is the name of the derivative of {other}; add `.derivative_of({other})`, or rename it"
+        );
+    }
     let mut before = HashSet::new();
     for known in variable.dependencies.iter().flatten() {
         let known = &table.variables[*known as usize];
@@ -221,9 +229,8 @@ fn check_derivatives(table: &Table) -> Result<()> {
     Ok(())
 }
 
-/// Indices in `fmi_abi::BASE_UNITS`.
+/// Index in `fmi_abi::BASE_UNITS`.
 const SECOND: usize = 2;
-const RADIAN: usize = 7;
 
 /// Rejects a derivative whose unit is not the unit of its state per second. A variable without a unit is not checked, and the radian
 /// may be left out.
@@ -260,9 +267,8 @@ fn check_units(table: &Table) -> Result<()> {
 }
 
 /// Returns the exponents of a unit as tools write them, without the radian.
-fn without_radian(mut unit: BaseUnit) -> String {
-    unit.exponents[RADIAN] = 0;
-    Some(unit.symbol()).filter(|symbol| !symbol.is_empty()).unwrap_or("none".to_owned())
+fn without_radian(unit: BaseUnit) -> String {
+    Some(unit.without_radian().symbol()).filter(|symbol| !symbol.is_empty()).unwrap_or("none".to_owned())
 }
 
 /// Returns the start values of a new model, after checking that they fit their types and are the same for each interface type. Also checks

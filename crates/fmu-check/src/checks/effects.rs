@@ -22,12 +22,13 @@ fn array_of(name: &str) -> &str {
     name.strip_suffix(']').and_then(|name| name.split_once('[')).map_or(name, |(array, _)| array)
 }
 
-/// Returns all parameters that are numbers, Booleans or items. Strings are left out, because many are only labels.
-fn groups(description: &Description) -> Vec<Group> {
+/// Returns all parameters that are numbers, Booleans or items, and strings if they are wanted.
+fn groups(description: &Description, with_strings: bool) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for (index, variable) in description.variables.iter().enumerate() {
         let is_number = variable.is_number() && variable.size == Some(variable.starts().len());
-        if variable.causality != Causality::Parameter || variable.clocked || !is_number {
+        let is_tried = is_number || with_strings && variable.base == Some(BaseType::String);
+        if variable.causality != Causality::Parameter || variable.clocked || !is_tried {
             continue;
         }
         let name = array_of(&variable.name);
@@ -43,6 +44,10 @@ fn groups(description: &Description) -> Vec<Group> {
 }
 
 fn other_values_of(description: &Description, indices: &[usize]) -> Vec<Vec<(usize, Values)>> {
+    if description.variables[indices[0]].base == Some(BaseType::String) {
+        let others = indices.iter().map(|index| Some((*index, other_values(description, *index)?)));
+        return others.collect::<Option<Vec<_>>>().into_iter().collect();
+    }
     let start = |variable: &Variable, index| Values::new(description.kind(index), variable.starts());
     let all = |change: &dyn Fn(&Variable, f64) -> Option<f64>| -> Option<Vec<(usize, Values)>> {
         let changed = indices.iter().map(|index| {
@@ -58,6 +63,9 @@ fn other_values_of(description: &Description, indices: &[usize]) -> Vec<Vec<(usi
         found.extend(
             [1.0 / 64.0, 0.5, -0.5].map(|by| all(&|variable, start| Some(near(variable, start, by)))),
         );
+    } else if let Some(items) = items(description, indices[0]) {
+        let all_items = |item: f64| all(&move |_, _| Some(item));
+        found.extend(items.into_iter().take(MOST_ITEMS).map(all_items));
     } else {
         let others = indices.iter().map(|index| Some((*index, other_values(description, *index)?)));
         found.push(others.collect());
@@ -70,6 +78,17 @@ fn other_values_of(description: &Description, indices: &[usize]) -> Vec<Vec<(usi
             .any(|(index, value)| value.differ(&start(&description.variables[*index], *index)).is_some())
     });
     found
+}
+
+/// Maximum number of items of an enumeration that are tried.
+const MOST_ITEMS: usize = 8;
+
+/// Returns the numbers of the items, if the variable is an enumeration.
+fn items(description: &Description, index: usize) -> Option<Vec<f64>> {
+    let variable = &description.variables[index];
+    let items = description.enumerations.get(variable.declared_type.as_deref()?)?;
+    (variable.base == Some(BaseType::Enumeration))
+        .then(|| items.iter().map(|(_, item)| *item as f64).collect())
 }
 
 /// Calls of a simulation with other values of a parameter.
@@ -121,7 +140,28 @@ impl Variation {
     }
 }
 
-/// Simulations without change, then with each of the other values; and the same again with other discrete inputs and Booleans.
+/// Returns a different value of each floating-point input.
+fn other_inputs(description: &Description) -> Vec<(usize, Values)> {
+    let is_wanted = |(_, variable): &(usize, &Variable)| {
+        variable.causality == Causality::Input
+            && variable.is_float()
+            && !variable.clocked
+            && !variable.once_per_instant
+            && variable.size == Some(variable.starts_count())
+    };
+    let inputs = description.variables.iter().enumerate().filter(is_wanted).take(1000).enumerate();
+    let value = |(number, (index, variable)): (usize, (usize, &Variable))| {
+        let numbers = variable
+            .starts()
+            .into_iter()
+            .map(|start| near(variable, start, 0.5 + 0.3 * (number as f64).sin()));
+        (index, Values::new(description.kind(index), numbers))
+    };
+    inputs.map(value).collect()
+}
+
+/// Simulations without change, then with each of the other values; the same again with other discrete inputs and Booleans, and again with
+/// other floating-point inputs, because a controller whose inputs are all 0 has nothing to control.
 struct Variations(Vec<(Variation, Vec<Variation>)>);
 
 impl Variations {
@@ -139,8 +179,16 @@ impl Variations {
         let switches = (0..description.variables.len()).filter(is_switch);
         let switches: Vec<_> =
             switches.filter_map(|index| Some((index, other_values(description, index)?))).collect();
-        let inputs =
-            if count > 1 && !switches.is_empty() { vec![Vec::new(), switches] } else { vec![Vec::new()] };
+        let mut inputs = vec![Vec::new()];
+        if count > 1 {
+            let numbers = other_inputs(description);
+            if !switches.is_empty() {
+                inputs.push(switches.clone());
+            }
+            if !numbers.is_empty() {
+                inputs.push([switches, numbers].concat());
+            }
+        }
         let with = |inputs: &Vec<(usize, Values)>| {
             let base = Variation::write(writer, &[], inputs);
             let others = group.others.iter().take(count);
@@ -168,7 +216,8 @@ pub fn parameters(checker: &Checker) -> anyhow::Result<()> {
     let Some(first) = checker.trajectories.first().filter(|_| description.variables.len() <= MAX_READ) else {
         return Ok(());
     };
-    for group in groups(description).iter().take(checker.at_most(400)) {
+    // Strings are left out, because many are only labels.
+    for group in groups(description, false).iter().take(checker.at_most(400)) {
         // The first value suffices for most parameters.
         let counts = [1, group.others.len()];
         let mut has_effect = group.others.is_empty();
@@ -226,8 +275,8 @@ pub fn calculated_parameters(checker: &Checker, trajectory: &Trajectory) -> anyh
     };
     let calculated: Vec<usize> =
         of(Causality::CalculatedParameter).filter(|index| checker.readable.contains(index)).collect();
-    let groups = groups(description);
-    // The parameters that are not tried are strings, clocked or structural.
+    let groups = groups(description, true);
+    // The parameters that are not tried are bytes, clocked or structural.
     let tried: usize =
         groups.iter().filter(|group| !group.others.is_empty()).map(|group| group.indices.len()).sum();
     let all = of(Causality::Parameter).count() + of(Causality::StructuralParameter).count();

@@ -40,6 +40,7 @@ pub(crate) fn pack(plan: &Plan, mut paged: Paged) -> Result<()> {
         write(plan, &parts)?;
     }
     warn_of_glibc(plan, &compiled.libraries);
+    warn_of_path(plan, &compiled.libraries);
     if let Some(kept) = &plan.kept {
         compare_with_kept(plan, kept, descriptions);
     }
@@ -84,6 +85,26 @@ fn warn_of_glibc(plan: &Plan, libraries: &[Library]) {
     }
 }
 
+/// Prints a warning if a library contains the absolute path of the package, which does not exist on other computers.
+fn warn_of_path(plan: &Plan, libraries: &[Library]) {
+    let directory = &plan.builder.sources.directory;
+    let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.clone());
+    if libraries.iter().any(|library| names_path(&library.bytes, &directory)) {
+        eprintln!(
+            "warning: the library contains the path {}, which other computers do not have, as from env!(\"CARGO_MANIFEST_DIR\"); put files \
+             into modelDescription/resources and open them with `setup.resource`",
+            directory.display()
+        );
+    }
+}
+
+/// Returns whether a library without debug information contains this path.
+fn names_path(library: &[u8], path: &Path) -> bool {
+    let path = path.to_string_lossy();
+    let has = |text: &str| library.windows(text.len()).any(|window| window == text.as_bytes());
+    path.len() > 1 && has(&path) && !has(".debug_info")
+}
+
 /// Prints a note if the committed description is out of date.
 fn compare_with_kept(plan: &Plan, kept: &Path, descriptions: &[(Standard, String)]) {
     if let Some((fmi, description)) = descriptions.first()
@@ -95,5 +116,20 @@ fn compare_with_kept(plan: &Plan, kept: &Path, descriptions: &[(Standard, String
             "note: {DESCRIPTION} in the sources is out of date; update it with\n      {} --describe",
             plan.builder.command
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::names_path;
+    use std::path::Path;
+
+    #[test]
+    fn a_path_is_found_unless_it_is_debug_information() {
+        let path = Path::new("/home/me/tank");
+        assert!(names_path(b"\0/home/me/tank/table.csv\0", path));
+        assert!(!names_path(b"\0src/lib.rs\0", path));
+        assert!(!names_path(b"\0/home/me/tank\0.debug_info\0", path));
+        assert!(!names_path(b"/", Path::new("/")));
     }
 }

@@ -1,8 +1,12 @@
 //! Accepts or rejects an FMU that is being built, with the same checks as `cargo fmu check --quick`.
 
 use anyhow::Result;
+use fmi_abi::BaseUnit;
 use fmu_check::{Finding, Progress, Report, Severity, check};
-use std::path::PathBuf;
+use fmu_run::ModelDescription;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Options of the command.
@@ -25,9 +29,18 @@ const TOPICS: [&str; 8] = [
 /// The topics whose findings prove nothing if the results of a model are random.
 const REPEATED: [&str; 2] = ["states", "dynamics"];
 
+/// The rules that show that the same calls have different results, and why. The first that is broken counts.
+const UNREPEATABLE: [(&str, &str); 2] = [
+    ("results.process", "the results of the model are random"),
+    (
+        "results.instances",
+        "the results of the model depend on its other instances, as through a counter in a `static`, which must be a field of the model",
+    ),
+];
+
 /// The beginnings of the names of the rules that a model must not break, and what its author changes if it does. The first that fits
 /// counts. Findings of other rules are warnings.
-const REMEDIES: [(&str, &str); 12] = [
+const REMEDIES: [(&str, &str); 15] = [
     (
         "dynamics.step-derivative",
         "compare `step` with `by` of the derivative, its `derivative_of`, and the size of the inner steps",
@@ -43,11 +56,19 @@ const REMEDIES: [(&str, &str); 12] = [
     // The messages of the model state the reason.
     ("life_cycle.simulation", ""),
     ("life_cycle.rejected", ""),
+    ("states.serialized", MEMORY),
+    ("states.fresh-process", MEMORY),
+    ("states.bytes", MEMORY),
     (
         "states.",
-        "name every field that initialize, a step or an event changes after `memory in` of variables!",
+        "reading must change nothing, `Clone` must copy every field, and values that change must not be outside the model or shared, \
+         as in a `static`, a `OnceLock` or an `Rc`",
     ),
 ];
+
+/// What an author does if the bytes of a state lack something.
+const MEMORY: &str =
+    "name every field that initialize, a step or an event changes after `memory in` of variables!";
 
 /// Rules whose findings are only notes, but usually mistakes of an author, and what to do.
 const HINTS: [(&str, &str); 3] = [
@@ -73,11 +94,13 @@ pub fn judge(options: &Options) -> Result<bool> {
     let report = checked(options, &TOPICS)?;
     let (mut mistakes, others): (Vec<_>, Vec<_>) = report.findings.iter().partition(|of| is_mistake(of));
     mistakes.sort_by_key(|finding| remedy(finding).map(|(rank, _)| rank));
-    if mistakes.iter().any(|finding| REPEATED.contains(&finding.topic()))
-        && checked(options, &["results"])?.findings.iter().any(is_random)
-    {
-        mistakes.retain(|finding| !REPEATED.contains(&finding.topic()));
-        println!("warning: the results of the model are random, so its saved states cannot be compared");
+    if mistakes.iter().any(|finding| REPEATED.contains(&finding.topic())) {
+        let findings = checked(options, &["results"])?.findings;
+        let reason = UNREPEATABLE.iter().find(|(rule, _)| findings.iter().any(|of| of.name == *rule));
+        if let Some((_, reason)) = reason {
+            mistakes.retain(|finding| !REPEATED.contains(&finding.topic()));
+            println!("warning: {reason}, so its saved states cannot be compared");
+        }
     }
     let mut texts = mistakes.iter().map(|finding| text(finding));
     if let Some(first) = texts.next() {
@@ -90,10 +113,51 @@ pub fn judge(options: &Options) -> Result<bool> {
     {
         println!("warning: {}", text(finding));
     }
-    for unchecked in report.unreached.iter().filter(|unchecked| !unchecked.allowed) {
-        println!("warning: {} was not checked completely: {}", unchecked.name, unchecked.why);
+    for warning in units(&description(&options.fmu)?) {
+        println!("warning: {warning}");
+    }
+    let mut unchecked: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for of in report.unreached.iter().filter(|of| !of.allowed) {
+        unchecked.entry(&of.why).or_default().push(&of.name);
+    }
+    for (why, names) in unchecked {
+        println!("warning: not checked completely: {}: {why}", names.join(", "));
     }
     Ok(true)
+}
+
+/// Returns the model description of an FMU.
+fn description(fmu: &Path) -> Result<ModelDescription> {
+    let mut archive = zip::ZipArchive::new(File::open(fmu)?)?;
+    let text = std::io::read_to_string(archive.by_name("modelDescription.xml")?)?;
+    ModelDescription::parse(&text).map_err(anyhow::Error::msg)
+}
+
+/// Describes the units whose names mean something else than their definitions. The radian may be left out.
+fn units(description: &ModelDescription) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (name, unit) in &description.units {
+        let Some(base) = unit.base else { continue };
+        if let Some(meant) = BaseUnit::of_name(name)
+            && !meant.without_radian().equals(&base.without_radian())
+        {
+            wrong.push(format!("the unit {name} is declared as {base}, but its name means {meant}"));
+        }
+        for display in &unit.display_units {
+            let conversion = BaseUnit::of_name(&display.name)
+                .and_then(|meant| base.without_radian().conversion_to(&meant.without_radian()));
+            let differs = |one: f64, other: f64| (one - other).abs() > 1e-6 * one.abs().max(other.abs());
+            if let Some((factor, offset)) = conversion
+                && (differs(factor, display.factor) || differs(offset, display.offset))
+            {
+                wrong.push(format!(
+                    "{} for the unit {name} is displayed with the factor {} and the offset {}, but the names mean {factor} and {offset}",
+                    display.name, display.factor, display.offset
+                ));
+            }
+        }
+    }
+    wrong
 }
 
 /// Checks these topics.
@@ -110,11 +174,6 @@ fn checked(Options { fmu, time_limit }: &Options, topics: &[&str]) -> Result<Rep
         ..fmu_check::Options::default()
     };
     check(fmu, &options, Progress::Every(INTERVAL))
-}
-
-/// Returns whether a finding shows that results are random.
-fn is_random(finding: &Finding) -> bool {
-    ["results.process", "results.instances"].contains(&&*finding.name)
 }
 
 /// Returns whether a finding rejects the build.
