@@ -359,6 +359,11 @@ fn other_packages_are_rejected() {
     let output = directory.rejects("", &["new", "7-segments"]);
     assert!(output.starts_with("error: invalid character `7` in package name"), "{output}");
     assert!(!directory.path("7-segments").exists());
+    let output = directory.rejects("", &["new", "fmu-export"]);
+    assert!(
+        output.starts_with("error: fmu-export is the name of the library that the model uses"),
+        "{output}"
+    );
     let output = directory.rejects("", &["new", "größe"]);
     assert!(output.starts_with("error: größe has letters other than a to z"), "{output}");
     assert!(!directory.path("größe").exists());

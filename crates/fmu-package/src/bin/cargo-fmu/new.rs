@@ -75,6 +75,10 @@ fn create(options: &Options) -> Result<()> {
         name.is_ascii(),
         "{name} has letters other than a to z, which an FMU cannot have in its identifier; add --name with letters, digits, - and _"
     );
+    ensure!(
+        name.replace('-', "_") != "fmu_export",
+        "{name} is the name of the library that the model uses; add --name with another name"
+    );
     // Cargo checks the name, adds the crate to a workspace above it, and creates a git repository unless there is one above.
     let cargo = cargo();
     let mut command = Command::new(&cargo);

@@ -92,7 +92,7 @@ pub fn examine(
         }
         end = *from;
     }
-    // What the bytes lack keeps the value from the end of the motion.
+    // What the bytes lack keeps the value that it has in the instance, which belongs to a later time.
     let mut end = before.len();
     for (from, bytes) in saved.iter().rev().filter_map(|(from, _, bytes)| Some((from, bytes.as_ref()?))) {
         let state = walk.instances.deserialize(bytes)?;
