@@ -54,6 +54,7 @@ COMPILERS = {
     "mingw": Compiler(("x86_64-w64-mingw32-gcc", "-static"), (toolchain.WINE,)),
     "aarch64": Compiler(("aarch64-linux-gnu-gcc", "-static"), ("qemu-aarch64",)),
     "clang for aarch64": Compiler(("clang", "--target=aarch64-linux-gnu", "-static"), ("qemu-aarch64",)),
+    "riscv64": Compiler(("riscv64-linux-gnu-gcc", "-static"), ("qemu-riscv64",)),
     "armhf": Compiler(("arm-linux-gnueabihf-gcc", "-static"), ("qemu-arm",)),
 }
 

@@ -99,6 +99,7 @@ OPTIONS = {
     "mingw": [("-O2",)],
     "aarch64": [("-std=gnu99", "-O2"), ("-O3", "-ffp-contract=fast")],
     "clang for aarch64": [("-O2",)],
+    "riscv64": [("-std=gnu99", "-O2")],
     "armhf": [("-O2",)],
 }
 
