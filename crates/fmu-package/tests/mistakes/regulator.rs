@@ -37,11 +37,13 @@ struct Regulator {
 
 variables! { for Regulator, memory in next;
     /// Reference
-    reference = input(&NUMBER) in reference;
+    reference = input(&NUMBER).discrete() in reference;
     /// Measured value
-    measured = input(&NUMBER) in measured;
+    measured = input(&NUMBER).discrete() in measured;
     /// Manipulated value
     manipulated = output(&NUMBER).discrete().exact() in manipulated;
+    /// Time of the next sample
+    next = output(&Type::real("Time", &units::S)).discrete() by |regulator| regulator.next;
     /// Integral part
     integral = local(&NUMBER).discrete().exact() in integral;
     /// Gain

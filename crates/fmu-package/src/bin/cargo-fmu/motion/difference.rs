@@ -226,7 +226,8 @@ impl Judged<'_> {
                 event.time
             );
         }
-        let events = || self.integrated.events.iter().filter(|event| event.time > self.time[0]);
+        // In the other run, each step of a held input is an event.
+        let events = || self.lines.events.iter().filter(|event| event.time > self.time[0]);
         if events().next().is_none() && self.description.event_indicators == 0 && self.description.states == 0
         {
             return "Model Exchange has no event after the start: without indicators, `event` must return the time of the next event in \

@@ -111,13 +111,13 @@ pub fn examine(fmu: &Fmu, motion: &Motion) -> Result<Examination> {
     if let Some(integrated) = &integrated {
         mistakes.extend(events::mistakes(description, integrated, time, &watched));
     }
-    let saved =
-        stepped.as_ref().map(|stepped| saved::examine(fmu, motion, &numeric, stepped, integrated.as_ref()));
+    // A model may interpolate its inputs in Co-Simulation.
+    let lines = (stepped.is_some() && integrated.is_some()).then(|| exchanged(&moved, &names)).transpose()?;
+    let events = lines.as_ref().map_or(&[][..], |lines| &lines.events);
+    let saved = stepped.as_ref().map(|stepped| saved::examine(fmu, motion, &numeric, stepped, events));
     let saved = saved.transpose()?.flatten();
-    let comparison = match (stepped, integrated) {
-        (Some(stepped), Some(integrated)) if !compared.is_empty() => {
-            // A model may interpolate its inputs in Co-Simulation.
-            let lines = exchanged(&moved, &names)?;
+    let comparison = match (stepped, integrated, lines) {
+        (Some(stepped), Some(integrated), Some(lines)) if !compared.is_empty() => {
             // Results of half the step size show the error of the steps. A model may reject other step sizes.
             let halves: Vec<f64> =
                 time.windows(2).flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]).collect();

@@ -4,7 +4,9 @@ use super::{Motion, Run};
 use crate::inputs::is_exact;
 use anyhow::Result;
 use fmi_abi::Causality;
-use fmu_run::{Description, Fmu, Instances, Interface, Selection, Setup, Start, Trajectory, Value};
+use fmu_run::{
+    Description, Fmu, Instances, Interface, Occurrence, Selection, Setup, Start, Trajectory, Value,
+};
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -49,13 +51,14 @@ const MOST: [usize; 2] = [1000, 20_000_000];
 /// Saves the state at several instants and around events, also as bytes. Then restores these states, the last one first, and compares the
 /// results of the following steps with those before. Returns `None` if they are the same, or if the FMU cannot save its state.
 ///
-/// `stepped` is the run for Co-Simulation: its last variables are the numeric inputs, with these names.
+/// `stepped` is the run for Co-Simulation: its last variables are the numeric inputs, with these names. `events` are those of Model
+/// Exchange.
 pub fn examine(
     fmu: &Fmu,
     motion: &Motion,
     numeric: &[&str],
     stepped: &Run,
-    integrated: Option<&Run>,
+    events: &[Occurrence],
 ) -> Result<Option<Mistake>> {
     let description = fmu.description();
     let saves = description.offer(Interface::CoSimulation).is_some_and(|offer| offer.saves_states);
@@ -67,7 +70,7 @@ pub fn examine(
         return Ok(None);
     }
     let mut walk = Walk::new(fmu, motion, numeric, inputs)?;
-    let instants = instants(motion.time, steps, integrated);
+    let instants = instants(motion.time, steps, events);
     let serializes = description.offer(Interface::CoSimulation).is_some_and(|offer| offer.serializes_states);
     let (mut saved, mut before) = (Vec::new(), Vec::new());
     for step in 0..steps {
@@ -107,8 +110,7 @@ pub fn examine(
 }
 
 /// Returns the indices of the communication points at which the state is saved.
-fn instants(time: &[f64], steps: usize, integrated: Option<&Run>) -> BTreeSet<usize> {
-    let events = integrated.map_or(&[][..], |run| &run.events);
+fn instants(time: &[f64], steps: usize, events: &[Occurrence]) -> BTreeSet<usize> {
     let ends: BTreeSet<usize> =
         events.iter().map(|event| time.partition_point(|time| *time < event.time)).collect();
     let chosen = ends.iter().step_by(ends.len().div_ceil(MOST_EVENTS).max(1));
