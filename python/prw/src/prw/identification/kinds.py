@@ -94,12 +94,12 @@ KINDS = {
         belongs=True,
         positive=True,
     ),
+    # Only on request, because the data of a jump, which has another value at the beginning, fit an even decrease, too.
     "softening": Kind(
         1e-2,
         {name: f"decrease of {name} over the recording" for name in ("k1", "k2")},
         "%",
         1e-2,
-        belongs=True,
     ),
     "turned": Kind(
         1e-2, {"imu": "turn of the inertial sensor from pitch towards roll"}, "deg", math.pi / 180, belongs=True
