@@ -151,9 +151,8 @@ class LinearModel:
 def described_outputs() -> dict[str, str]:
     """Returns the unit of each output in the model description."""
     root = ElementTree.parse(Path(__file__).parents[2] / "modelDescription" / "modelDescription.xml").getroot()
-    units = {each.get("name"): each[0].get("unit", "") for each in root.iter("SimpleType")}
     listed = [each for each in root.iter("ScalarVariable") if each.get("causality") == "output"]
-    return {each.get("name", ""): units[each[0].get("declaredType")] for each in listed}
+    return {each.attrib["name"]: each[0].attrib["unit"] for each in listed}
 
 
 #: The outputs of the FMU in the order of its description, and their units.

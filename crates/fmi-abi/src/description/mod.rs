@@ -63,7 +63,7 @@ pub struct ModelDescription {
     pub units: BTreeMap<String, Unit>,
     /// Names of the declared types.
     pub types: BTreeSet<String>,
-    /// Enumerations by name, each with the names and numbers of its items.
+    /// Name and number of each item of an enumeration, by the name of the enumeration's type.
     pub enumerations: BTreeMap<String, Vec<(String, i64)>>,
     /// Whether the names of variables are structured (`variableNamingConvention`).
     pub structured_names: bool,

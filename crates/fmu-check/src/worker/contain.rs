@@ -246,7 +246,8 @@ mod linux {
         None
     };
 
-    /// On x86-64, numbers of system calls from here on belong to x32, another interface to the same calls.
+    /// On x86-64, the kernel accepts each system call under a second number, which is larger by this one (x32). The filter rejects these
+    /// numbers, because it compares only with the first ones.
     const X32: i32 = 0x4000_0000;
 
     /// Starts a session, and installs a filter for system calls. The filter ends this process with SIGSYS if it sends a signal to

@@ -18,7 +18,8 @@ fn found(fmi: u32, topics: &str, expected: &[(&str, &str, &str)]) {
     all_found(&spring(directory.path(), fmi), topics, expected);
 }
 
-/// Asserts that an event is unannounced if the description forgets the event indicators.
+/// Without the number of event indicators, an importer does not look for state events. So the event that spring.c has there must be found
+/// as one that is not announced.
 #[test]
 fn events_without_indicators() {
     let directory = TempDir::new().expect("a directory");

@@ -1,4 +1,5 @@
-//! A model whose mistakes show only on the author's own motion: only there does it have events.
+//! A model whose only events happen if its input moves. The inputs of a build do not, so only the author's own motion shows mistakes in
+//! these events.
 #![allow(missing_docs, unsafe_code)]
 
 mod field;

@@ -88,7 +88,7 @@ impl Judged<'_> {
         });
         let most = most.max_by(|one, other| one.0.total_cmp(&other.0)).filter(|most| most.0 > 0.0);
         match most {
-            Some((share, of, difference, at)) if share > TOLERANCE => match self.converges(of) {
+            Some((share, of, difference, at)) if share > TOLERANCE => match self.converges(at, of) {
                 true => Comparison::Coarse(format!(
                     "by up to {difference:.1e} in {}, at {} s, which is {:.1} % of its range, and by less with half the step size; choose \
                      shorter steps to compare",
@@ -106,7 +106,7 @@ impl Judged<'_> {
         }
     }
 
-    /// Returns the index of the first time at which the difference of a variable exceeds the tolerance.
+    /// Returns the index of the first time at which a variable differs by more than [`TOLERANCE`] of its range.
     fn first(&self, of: usize) -> Option<usize> {
         self.indices(of).find(|at| self.share(*at, of) > TOLERANCE)
     }
@@ -122,12 +122,13 @@ impl Judged<'_> {
         ))
     }
 
-    /// Returns whether half the step size reduces the differences of a variable as much as a method of first order does, or more.
-    fn converges(&self, of: usize) -> bool {
+    /// Returns whether half the step size reduces the differences of a variable as much as a method of first order does, or more. A model
+    /// may reject half the step size, so a run that ends before the index `at` shows nothing.
+    fn converges(&self, at: usize, of: usize) -> bool {
         let of_half = |at: usize| self.distance(at, of, self.half.values[of].get(2 * at).copied());
-        let [whole, half] = [&|at| Some(self.difference(at, of)), &of_half as &dyn Fn(usize) -> Option<f64>]
-            .map(|difference| self.indices(of).filter_map(difference).sum::<f64>());
-        half <= 0.75 * whole
+        let both = self.indices(of).filter_map(|at| Some((self.difference(at, of), of_half(at)?)));
+        let (whole, half) = both.fold((0.0, 0.0), |(whole, half), (one, other)| (whole + one, half + other));
+        of_half(at).is_some() && half <= 0.75 * whole
     }
 
     /// Returns the difference that lasts from one time to the next. At a single time, an event near it may be handled before it in one
