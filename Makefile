@@ -147,6 +147,8 @@ test-long: need-rust headers importer-fmus source-fmu $(VENV)/examples.stamp
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-package --test cargo_fmu --test mistakes -- --ignored
 	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-check --test mutants -- --ignored
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-export --test rejected_by_the_compiler -- --ignored
+	$(NO_JOBS) $(CARGO) test $(LOCKED) -p fmu-run --test readers -- --ignored --exact malformed_files_are_errors_whatever_memory_there_is
 	$(PYTEST) -m long $(FMU_TESTS) tests/closed_loop tests/examples
 
 # C programs are compiled with the headers of the standard, which FMPy contains.

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from built import ROOT, program
+from lxml import etree
 
 TUTORIAL = ROOT / "python" / "prw" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
@@ -56,6 +57,12 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
         for name in ("k1", "k2", "c1", "c2", "c3"):
             off = np.log(found[name]["value"] / float(rig[name]))
             assert abs(off) < 0.01, f"{name} {off:+.2%}"
+    start = starts_of(tmp_path / "mine" / "modelDescription.xml")
+    identified = json.loads((tmp_path / "out" / "identified" / "report.json").read_text())["parameters"]
+    assert {name: start[name] for name in identified} == {
+        name: pytest.approx(entry["value"], rel=1e-14) for name, entry in identified.items()
+    }
+    assert start["M"] == 4 and start["N"] == 7
     # The page shows lines of the results, and the k1 of the second rig.
     page = TUTORIAL.read_text(encoding="utf-8")
     shown = [line for text in re.findall(r"^```text\n(.*?)^```$", page, re.S | re.M) for line in text.splitlines()]
@@ -64,6 +71,13 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
     for name in ("report.html", "report.json", "identified.json", "identified.ssv"):
         assert (tmp_path / "out" / "identified" / name).is_file()
     assert (tmp_path / "out" / "sweep" / "runs.parquet").is_file()
+
+
+def starts_of(description: Path) -> dict[str, float]:
+    """The start values of the numbers in a model description of FMI 2.0."""
+    variables = etree.parse(str(description)).iterfind(".//ScalarVariable")
+    numbers = [v for v in variables if v[0].tag in ("Real", "Integer") and v[0].get("start")]
+    return {v.get("name"): float(v[0].get("start")) for v in numbers}
 
 
 def run(command, directory, environment) -> str:

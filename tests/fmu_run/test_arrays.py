@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -33,9 +34,10 @@ OUTPUTS = [
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-test-kit/src/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     directory = tmp_path_factory.mktemp("rods")
-    # Built with --workspace, like the Rust tests. With --package, cargo would compile crates again with other features.
-    build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
-    subprocess.run(build, cwd=ROOT, check=True)
+    # `make test` has built it with the Rust tests. With --package, cargo would compile crates again with other features.
+    if "PROGRAMS" not in os.environ:
+        build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
+        subprocess.run(build, cwd=ROOT, check=True)
     examples = ROOT / "target/debug/examples"
     subprocess.run([examples / "rod", examples / "librod.so", directory], cwd=ROOT, check=True)
     return directory / "rod2.fmu", directory / "rod3.fmu"
