@@ -216,6 +216,8 @@ pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String>
     let result = match step {
         Step::Make(..) if status == 0 => "NULL".to_owned(),
         Step::Call { .. } | Step::Free(_) if status > 1 => status_name(status),
+        // Discard means that it was not finished, for example because there were too many events.
+        Step::Integrate(..) if status > 2 => status_name(status),
         _ => return None,
     };
     let why = outcome.log.iter().rev().find_map(|message| message.text.as_ref());

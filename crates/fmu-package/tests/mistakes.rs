@@ -181,7 +181,7 @@ fn probable_mistakes_are_warnings() {
 }
 
 /// The parameters of a sampled controller act, although its inputs are equal in the simulations of the check. A name of a unit that means
-/// something else is found.
+/// something else is found, and what happens only at the limit of a range or near the stop time.
 #[test]
 fn parameters_without_effect_are_warnings() {
     let directory = package("regulator");
@@ -195,6 +195,21 @@ fn parameters_without_effect_are_warnings() {
     assert_eq!(warnings(""), "");
     assert!(warnings("enumeration").contains("hold changes no value, no derivative and no event"));
     assert!(warnings("calculated").contains("share is 0.5 for all values of the parameters that were tried"));
+    assert!(
+        warnings("talkative")
+            .contains("steps logs a message; the first is \"a step from 0 s\"; log what happens once")
+    );
+    let limit = warnings("limit");
+    assert!(
+        limit.contains("if reset is 0.1, its min, ") && limit.contains("share is not a finite number"),
+        "{limit}"
+    );
+    let counted = warnings("counted");
+    assert!(
+        counted.contains(" returns Fatal: ")
+            && counted.contains("add with overflow")
+            && counted.contains("dynamics.stop-time")
+    );
 }
 
 #[test]

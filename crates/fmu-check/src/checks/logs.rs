@@ -1,8 +1,8 @@
-//! Checks that the FMU logs nothing while logging is off.
+//! Checks that the FMU logs nothing while logging is off, and does not log a message in each step.
 
 use crate::call_sequence::Arg;
 use crate::checker::Checker;
-use crate::writer::Part::{Call, Enter, Free, Leave, Points, ReadAll};
+use crate::writer::Part::{Begin, Call, Enter, Free, Leave, Points, ReadAll};
 use crate::writer::Trajectory;
 
 /// Checks that successful calls log no message if logging is off at the instantiation, or was switched off by `SetDebugLogging`.
@@ -33,4 +33,27 @@ pub fn switches(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
         })?;
     }
     Ok(())
+}
+
+/// Fewest steps whose messages are too many.
+const MANY: usize = 5;
+
+/// Checks that not each step logs a message.
+pub fn each_step(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let mut writer = checker.writer(trajectory);
+    writer.write(0, &[Begin]);
+    let points: Vec<Vec<u32>> = trajectory.points.iter().map(|point| writer.point(0, point)).collect();
+    writer.write(0, &[Free]);
+    checker.check("logs.each-step", writer.sequence, move |run| {
+        let message = |ids: &Vec<u32>| {
+            let outcomes = ids.iter().filter_map(|id| run.outcome(*id));
+            outcomes.flat_map(|outcome| &outcome.log).find_map(|message| message.text.clone())
+        };
+        let messages: Vec<Vec<u8>> = points.iter().map_while(message).collect();
+        let (all, first) = (points.len(), messages.first()?);
+        let is_each = all >= MANY && messages.len() == all;
+        is_each.then(|| {
+            format!("each of {all} steps logs a message; the first is {:?}", String::from_utf8_lossy(first))
+        })
+    })
 }

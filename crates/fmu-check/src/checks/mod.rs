@@ -13,6 +13,7 @@ pub mod integration;
 pub mod interfaces;
 pub mod late_outputs;
 pub mod life_cycle;
+pub mod limits;
 pub mod location;
 pub mod logs;
 pub mod malformed;
@@ -147,11 +148,14 @@ pub const ALL: &[(&str, Check)] = &[
     ("dynamics", Each(Integrated, hidden_events::unannounced)),
     ("dynamics", Each(Integrated, hidden_events::repeated)),
     ("dynamics", Each(Always, start_times::starts)),
+    ("dynamics", Each(Always, limits::ranges)),
+    ("dynamics", Each(Always, limits::stop_time)),
     ("start_values", Once(effects::parameters)),
     ("dependencies", Each(Always, effects::calculated_parameters)),
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),
     ("logs", Each(Always, logs::switches)),
+    ("logs.each-step", Each(Always, logs::each_step)),
     ("malformed", Malformed("malformed.null-instance", Always, malformed::null_instances)),
     ("malformed", Malformed("malformed.null", Always, malformed::nulls)),
     ("malformed", Malformed("malformed.references", Always, malformed::references)),

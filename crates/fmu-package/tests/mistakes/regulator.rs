@@ -33,9 +33,11 @@ struct Regulator {
     hold: Hold,
     label: String,
     next: f64,
+    samples: u8,
+    log: Log,
 }
 
-variables! { for Regulator, memory in next;
+variables! { for Regulator, memory in next, samples;
     /// Reference
     reference = input(&NUMBER).discrete() in reference;
     /// Measured value
@@ -57,6 +59,8 @@ variables! { for Regulator, memory in next;
     /// Integral gain, as a share of the gain
     share = calculated_parameter(&NUMBER) by |regulator| match mistake() {
         "calculated" => 0.5,
+        // `reset` may be 0.1.
+        "limit" => 1.0 / (regulator.reset - 0.1),
         _ => 1.0 / regulator.reset,
     };
     /// Its unit is not millihenry
@@ -66,13 +70,36 @@ variables! { for Regulator, memory in next;
 }
 
 impl Model for Regulator {
-    const INFO: Info = Info::new("Regulator", "regulator");
+    const INFO: Info = Info {
+        default_experiment: DefaultExperiment {
+            stop_time: 30.0,
+            step_size: 0.1,
+            ..DefaultExperiment::DEFAULT
+        },
+        ..Info::new("Regulator", "regulator")
+    };
 
     fn new(setup: &Setup) -> Result<Self, Error> {
         read_mistake(setup);
         let (reference, measured, manipulated, integral, next) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let (gain, reset, hold, label) = (0.5, 2.0, Hold::Value, String::from("loop"));
-        Ok(Self { reference, measured, manipulated, integral, gain, reset, hold, label, next })
+        Ok(Self {
+            reference,
+            measured,
+            manipulated,
+            integral,
+            gain,
+            reset,
+            hold,
+            label,
+            next,
+            samples: 0,
+            log: Log::default(),
+        })
+    }
+
+    fn log(&mut self) -> Option<&mut Log> {
+        Some(&mut self.log)
     }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
@@ -94,6 +121,9 @@ impl ModelExchange for Regulator {
             };
             self.manipulated = share * (self.gain * error + self.integral);
             self.next += 0.1;
+            // The last of 300 samples is one too many.
+            self.samples =
+                if mistake() == "counted" { self.samples + 1 } else { self.samples.saturating_add(1) };
         }
         Ok(Event { next: Some(self.next), ..Event::default() })
     }
@@ -103,6 +133,9 @@ impl CoSimulation for Regulator {
     const EVENTS: Events = Events::Stop;
 
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        if mistake() == "talkative" {
+            self.log.event(format!("a step from {} s", step.time));
+        }
         Ok(if self.next < step.end() - 1e-9 { Stepped::Event(self.next) } else { Stepped::Done })
     }
 }

@@ -27,8 +27,12 @@ impl Purpose {
     }
 }
 
-/// Cargo settings for a short compile time.
-const FAST: [&str; 2] = ["profile.release.lto=\"off\"", "profile.release.incremental=true"];
+/// Cargo settings for a short compile time, with errors for integers that overflow.
+const FAST: [&str; 3] = [
+    "profile.release.lto=\"off\"",
+    "profile.release.incremental=true",
+    "profile.release.overflow-checks=true",
+];
 
 /// Builds the FMUs in the directory `options.out`, by default in `target/fmu` of the workspace. If the package has its own build
 /// program, starts it with `arguments` instead. If that program fails, returns false instead of an error, because the program has

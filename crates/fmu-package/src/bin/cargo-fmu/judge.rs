@@ -22,8 +22,9 @@ pub struct Options {
 /// The topics of fmu-check, and the rules of another topic, that are checked. A difference between the interface types is only a
 /// warning, because the steps of Co-Simulation may be approximations.
 #[rustfmt::skip]
-const TOPICS: [&str; 8] = [
+const TOPICS: [&str; 9] = [
     "life_cycle", "start_values", "states", "derivatives", "dependencies", "dynamics", "results.not-finite", "results.interfaces",
+    "logs.each-step",
 ];
 
 /// The topics whose findings prove nothing if the results of a model are random.
@@ -71,7 +72,7 @@ const MEMORY: &str =
     "name every field that initialize, a step or an event changes after `memory in` of variables!";
 
 /// Rules whose findings are only notes, but usually mistakes of an author, and what to do.
-const HINTS: [(&str, &str); 3] = [
+const HINTS: [(&str, &str); 4] = [
     (
         "start_values.no-effect",
         "use it or remove it, unless it acts only with other inputs or later than in this check",
@@ -81,6 +82,7 @@ const HINTS: [(&str, &str); 3] = [
         "dynamics.counted-entry",
         "`event` must check whether its condition holds, because importers may call it at any time",
     ),
+    ("logs.each-step", "log what happens once, such as an event"),
 ];
 
 /// How a model ends the process, or never returns, which it must not do in any call sequence.

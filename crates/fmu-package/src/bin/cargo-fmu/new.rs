@@ -234,7 +234,9 @@ fn manifest(name: &str, export: &Dependency, with_profile: bool) -> String {
     let export = export.in_manifest();
     // In a workspace, cargo ignores the profiles of its members.
     let profile = match with_profile {
-        true => "# Makes the library in the FMU small.\n[profile.release]\nlto = true\nstrip = true\n\n",
+        true => {
+            "# Makes the library in the FMU small. An integer that overflows is an error, not another number.\n[profile.release]\nlto = true\nstrip = true\noverflow-checks = true\n\n"
+        }
         false => "",
     };
     format!(
