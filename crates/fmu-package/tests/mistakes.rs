@@ -199,6 +199,9 @@ fn parameters_without_effect_are_warnings() {
         warnings("talkative")
             .contains("steps logs a message; the first is \"a step from 0 s\"; log what happens once")
     );
+    assert!(warnings("initial").contains(
+        "gain is tunable, but acts only if it is set before the initialization; use it in `step`, `event` or `by`"
+    ));
     let limit = warnings("limit");
     assert!(
         limit.contains("if reset is 0.1, its min, ") && limit.contains("share is not a finite number"),

@@ -1,4 +1,4 @@
-//! Looks for parameters that have no effect, which are usually mistakes of the author of a model.
+//! Looks for parameters that have no effect, or none after the initialization, which are usually mistakes of the author of a model.
 
 use crate::call_sequence::{CallSequence, End, Run, Values};
 use crate::checker::Checker;
@@ -6,7 +6,7 @@ use crate::description::{Description, Variable};
 use crate::values::{near, other_values};
 use crate::writer::Part::{Enter, Free, Leave, Make, ReadAll};
 use crate::writer::{MAX_READ, Part, Read, Trajectory, Writer, difference, value_of};
-use fmi_abi::{BaseType, Causality};
+use fmi_abi::{BaseType, Causality, Variability};
 
 /// Parameter, or elements of an array that are separate parameters in FMI 2.0. They are changed together, because a table may have to
 /// rise, and a simulation may need only some of its elements.
@@ -107,6 +107,27 @@ impl Variation {
         let sets = writer.set(0, values);
         calls.extend(writer.set(0, inputs));
         calls.extend(writer.write(0, &[Enter, Leave]).ids);
+        Self::run(writer, sets, calls)
+    }
+
+    /// Sets the values after the initialization; in Model Exchange in Event Mode.
+    fn write_late(writer: &mut Writer, values: &[(usize, Values)], inputs: &[(usize, Values)]) -> Self {
+        let mut calls = writer.write(0, &[Make]).ids;
+        calls.extend(writer.set(0, inputs));
+        calls.extend(writer.write(0, &[Enter, Leave]).ids);
+        let in_event = !writer.trajectory.is_stepped();
+        if in_event {
+            calls.extend(writer.write(0, &[Part::Call("EnterEventMode")]).ids);
+        }
+        let sets = writer.set(0, values);
+        if in_event {
+            calls.extend(writer.leave_event(0));
+        }
+        Self::run(writer, sets, calls)
+    }
+
+    /// Writes the rest of the simulation.
+    fn run(writer: &mut Writer, sets: Vec<u32>, mut calls: Vec<u32>) -> Self {
         let first = writer.write(0, &[ReadAll]).reads;
         let rest = writer.write(0, &[Part::Run(0)]);
         calls.extend(rest.ids);
@@ -238,6 +259,43 @@ pub fn parameters(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Looks for a tunable parameter that acts if it is set before the initialization, but not if it is set after it.
+pub fn tunable_parameters(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    if trajectory.is_stepped() && description.event_mode() || description.variables.len() > MAX_READ {
+        return Ok(());
+    }
+    let is_tunable = |index: &usize| description.variables[*index].variability == Variability::Tunable;
+    let mut groups = groups(description, false);
+    groups.retain(|group| group.indices.iter().all(is_tunable));
+    for group in groups.iter().take(checker.at_most(400)) {
+        let Some(values) = group.others.first() else { continue };
+        let readable = others(checker, group);
+        let mut writer = Writer::new(description, trajectory, &readable);
+        let inputs = other_inputs(description);
+        let usual = Variation::write(&mut writer, &[], &inputs);
+        let early = Variation::write(&mut writer, values, &inputs);
+        let unchanged = Variation::write_late(&mut writer, &[], &inputs);
+        let late = Variation::write_late(&mut writer, values, &inputs);
+        let (description, name) = (description.clone(), group.name.clone());
+        checker.check("start_values.tunable", writer.sequence, move |run| {
+            let all_succeed = [&usual, &early, &unchanged, &late].iter().all(|of| of.succeeds(run));
+            let acts = |one: &Variation, other: &Variation| other.differs(run, &description, one);
+            let is_late = all_succeed && acts(&usual, &early) && !acts(&unchanged, &late);
+            is_late
+                .then(|| format!("{name} is tunable, but acts only if it is set before the initialization"))
+        })?;
+    }
+    Ok(())
+}
+
+/// Returns the variables that are read: all except the parameter and its aliases.
+fn others(checker: &Checker, group: &Group) -> Vec<usize> {
+    let is_of_group =
+        |index: &usize| checker.description.aliases(*index).any(|alias| group.indices.contains(&alias));
+    checker.readable.iter().copied().filter(|index| !is_of_group(index)).collect()
+}
+
 /// Writes the simulations, which read all variables except the parameter and its aliases.
 fn simulations(
     checker: &Checker,
@@ -246,8 +304,7 @@ fn simulations(
     count: usize,
 ) -> (CallSequence, Variations) {
     let description = &checker.description;
-    let is_of_group = |index: &usize| description.aliases(*index).any(|alias| group.indices.contains(&alias));
-    let others: Vec<usize> = checker.readable.iter().copied().filter(|index| !is_of_group(index)).collect();
+    let others = others(checker, group);
     let mut writer = Writer::new(description, trajectory, &others);
     let variations = Variations::write(&mut writer, group, count);
     (writer.sequence, variations)

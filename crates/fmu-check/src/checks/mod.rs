@@ -151,6 +151,7 @@ pub const ALL: &[(&str, Check)] = &[
     ("dynamics", Each(Always, limits::ranges)),
     ("dynamics", Each(Always, limits::stop_time)),
     ("start_values", Once(effects::parameters)),
+    ("start_values", Each(Always, effects::tunable_parameters)),
     ("dependencies", Each(Always, effects::calculated_parameters)),
     ("life_cycle", Each(Always, life_cycle::random)),
     ("life_cycle", Each(Integrated, life_cycle::events)),

@@ -34,10 +34,11 @@ struct Regulator {
     label: String,
     next: f64,
     samples: u8,
+    first_gain: f64,
     log: Log,
 }
 
-variables! { for Regulator, memory in next, samples;
+variables! { for Regulator, memory in next, samples, first_gain;
     /// Reference
     reference = input(&NUMBER).discrete() in reference;
     /// Measured value
@@ -49,7 +50,7 @@ variables! { for Regulator, memory in next, samples;
     /// Integral part
     integral = local(&NUMBER).discrete().exact() in integral;
     /// Gain
-    gain = parameter(&NUMBER) in gain;
+    gain = parameter(&NUMBER).tunable() in gain;
     /// Time in which a constant error doubles the manipulated value
     reset = parameter(&Type::real("Reset", &units::S).min(0.1)) in reset;
     /// What it does in the next period
@@ -94,6 +95,7 @@ impl Model for Regulator {
             label,
             next,
             samples: 0,
+            first_gain: gain,
             log: Log::default(),
         })
     }
@@ -104,6 +106,7 @@ impl Model for Regulator {
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
         self.next = experiment.start_time;
+        self.first_gain = self.gain;
         Ok(())
     }
 }
@@ -112,14 +115,15 @@ impl ModelExchange for Regulator {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if time >= self.next {
             let error = self.reference - self.measured;
-            self.integral += self.gain / self.reset * error * 0.1;
+            let gain = if mistake() == "initial" { self.first_gain } else { self.gain };
+            self.integral += gain / self.reset * error * 0.1;
             let share = match self.hold {
                 Hold::Value => 1.0,
                 _ if mistake() == "enumeration" => 1.0,
                 Hold::Nothing => 0.0,
                 Hold::Half => 0.5,
             };
-            self.manipulated = share * (self.gain * error + self.integral);
+            self.manipulated = share * (gain * error + self.integral);
             self.next += 0.1;
             // The last of 300 samples is one too many.
             self.samples =

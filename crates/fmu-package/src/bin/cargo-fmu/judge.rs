@@ -72,7 +72,7 @@ const MEMORY: &str =
     "name every field that initialize, a step or an event changes after `memory in` of variables!";
 
 /// Rules whose findings are only notes, but usually mistakes of an author, and what to do.
-const HINTS: [(&str, &str); 4] = [
+const HINTS: [(&str, &str); 5] = [
     (
         "start_values.no-effect",
         "use it or remove it, unless it acts only with other inputs or later than in this check",
@@ -83,6 +83,7 @@ const HINTS: [(&str, &str); 4] = [
         "`event` must check whether its condition holds, because importers may call it at any time",
     ),
     ("logs.each-step", "log what happens once, such as an event"),
+    ("start_values.tunable", "use it in `step`, `event` or `by`, or remove `.tunable()`"),
 ];
 
 /// How a model ends the process, or never returns, which it must not do in any call sequence.
