@@ -247,11 +247,12 @@ impl Motion {
         let (is_built, errors) = build(directory.path(), "fuse", "", fmi);
         assert!(is_built, "{errors}");
         fs::write(directory.path().join("current.csv"), "time,u\n0,0\n1,0\n1,1\n20,1\n").unwrap();
+        fs::write(directory.path().join("low.csv"), "time,u\n0,0\n1,0\n1,0.4\n9,0.4\n").unwrap();
         Self(directory, if fmi == "2" { "out/fuse.fmu" } else { "out/fmi3/fuse.fmu" })
     }
 
-    /// Examines the FMU with a mistake. Returns whether the check accepts it, and what it prints.
-    fn examined(&self, mistake: &str) -> (bool, String) {
+    /// Examines the FMU with a mistake and these inputs. Returns whether the check accepts it, and what it prints.
+    fn examined(&self, mistake: &str, inputs: &str) -> (bool, String) {
         let path = |name: &str| self.0.path().join(name);
         let mut fmu = zip::ZipArchive::new(fs::File::open(path(self.1)).unwrap()).unwrap();
         let mut with_mistake = zip::ZipWriter::new(fs::File::create(path("fuse.fmu")).unwrap());
@@ -265,29 +266,20 @@ impl Motion {
         with_mistake.write_all(mistake.as_bytes()).unwrap();
         with_mistake.finish().unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
-        command.args([
-            "fmu",
-            "check",
-            "--only",
-            "description",
-            "--input",
-            "current.csv",
-            "--fmu",
-            "fuse.fmu",
-        ]);
+        command.args(["fmu", "check", "--only", "description", "--input", inputs, "--fmu", "fuse.fmu"]);
         let output = command.current_dir(self.0.path()).output().unwrap();
         (output.status.success(), String::from_utf8(output.stdout).unwrap())
     }
 
     #[track_caller]
     fn shows(&self, mistake: &str, parts: &[&str]) {
-        let (is_accepted, output) = self.examined(mistake);
+        let (is_accepted, output) = self.examined(mistake, "current.csv");
         assert!(!is_accepted && parts.iter().all(|part| output.contains(part)), "{mistake:?}: {output}");
     }
 
     #[track_caller]
     fn shows_nothing(&self) {
-        let (is_accepted, output) = self.examined("");
+        let (is_accepted, output) = self.examined("", "current.csv");
         let found: Vec<&str> = output.lines().filter(|line| line.starts_with("fuse.fmu: ")).collect();
         assert!(is_accepted && matches!(found[..], [only] if only.contains(AGREE)), "{output}");
     }
@@ -328,4 +320,13 @@ fn the_motion_of_the_author_shows_further_mistakes() {
         &["differ from 10.501 s on: sample is ", "Model Exchange has no event", "`next`"],
     );
     motion.shows("erratic", &["differ from ", " s on: noise is "]);
+    // With the current that trips no fuse, the steps are only less exact.
+    let (is_accepted, output) = motion.examined("coarse", "low.csv");
+    assert!(
+        is_accepted
+            && output.contains(
+                " of its range, and by less with half the step size; choose shorter steps to compare"
+            ),
+        "{output}"
+    );
 }
