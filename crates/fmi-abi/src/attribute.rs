@@ -1,6 +1,6 @@
 //! Reads attributes of XML elements. A value of another type than the attribute's is an error and never a default.
 
-use crate::{Causality, DependencyKind, Initial, Variability, boolean, shown};
+use crate::{Causality, DependencyKind, Initial, IntervalVariability, Variability, boolean, shown};
 use roxmltree::Node;
 
 /// A type of attributes.
@@ -33,11 +33,13 @@ typed! {
     i32: "an integer of 32 bits" by parsed;
     i64: "an integer of 64 bits" by parsed;
     u32: "an integer from 0 to 4294967295" by parsed;
+    u64: "an integer from 0 to 18446744073709551615" by parsed;
     usize: "an integer from 0" by parsed;
     bool: "true, false, 1 or 0" by boolean;
     Causality: "a causality" by Causality::of_name;
     Variability: "a variability" by Variability::of_name;
     Initial: "exact, approx or calculated" by Initial::of_name;
+    IntervalVariability: "constant, fixed, tunable, changing, countdown or triggered" by IntervalVariability::of_name;
     DependencyKind: "a kind of dependency" by DependencyKind::of_name;
 }
 

@@ -136,3 +136,21 @@ attribute! {
         Dependent = "dependent",
     }
 }
+
+attribute! {
+    /// Source of the interval between two ticks of a clock (`intervalVariability`, section 2.2.8.2 of FMI 3.0).
+    IntervalVariability {
+        /// The interval is declared.
+        Constant = "constant",
+        /// The interval does not change after initialization.
+        Fixed = "fixed",
+        /// The interval changes only with tunable parameters.
+        Tunable = "tunable",
+        /// Each tick determines the interval to the next one.
+        Changing = "changing",
+        /// Any event may determine the interval to the next tick.
+        Countdown = "countdown",
+        /// The importer ticks an input clock when it wants to, and the FMU any other clock.
+        Triggered = "triggered",
+    }
+}

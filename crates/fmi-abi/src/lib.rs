@@ -36,7 +36,7 @@ pub mod write;
 pub mod xml;
 
 pub use base_type::BaseType;
-pub use causality::{Causality, DependencyKind, Initial, Variability};
+pub use causality::{Causality, DependencyKind, Initial, IntervalVariability, Variability};
 pub use limits::{empty_range, ends_too_early};
 pub use log_category::Category;
 pub use mode::{AllowedStates, FmiState, Mode};

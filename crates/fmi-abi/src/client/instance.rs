@@ -95,6 +95,17 @@ pub struct Event {
     pub next: Option<f64>,
 }
 
+/// Result of a step of Co-Simulation with event mode (section 4.2.1 of FMI 3.0).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepped {
+    /// Time that the FMU has reached, s.
+    pub time: f64,
+    /// Whether the FMU returned early, so that it has not reached the requested time.
+    pub early: bool,
+    /// Whether the FMU needs an event at the time that it has reached.
+    pub event: bool,
+}
+
 /// Quantities in Model Exchange with one value for each state or event indicator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuous {
@@ -109,7 +120,7 @@ pub enum Continuous {
 }
 
 /// Maximum number of iterations of an event.
-const MOST_ITERATIONS: usize = 10_000;
+pub const MOST_ITERATIONS: usize = 10_000;
 
 /// `fmi2Pending`: the step is performed asynchronously.
 const PENDING: c_int = Status::Pending as c_int;
@@ -437,6 +448,22 @@ impl Instance {
         }
     }
 
+    /// Performs a step of Co-Simulation with event mode (FMI 3.0). Unlike after [`step`](Self::step), the caller handles the event if the
+    /// FMU needs one.
+    ///
+    /// # Errors
+    /// The FMU rejects the step, ends the simulation (see [`Rejection::ended`]), returns early although this is not allowed, or is of
+    /// FMI 2.0.
+    pub fn step_to_event(&mut self, time: f64, size: f64) -> Result<Stepped, Rejection> {
+        let no_return = self.states.is_empty().into();
+        let ([mut event, mut terminate, mut early], mut reached) = ([fmi3False; 3], time + size);
+        call!(fmi3 self, fmi3DoStep(time, size, no_return, &mut event, &mut terminate, &mut early, &mut reached))?;
+        if terminate != fmi3False || early != fmi3False && !self.early_return {
+            return Err(self.stopped(terminate != fmi3False, time, reached));
+        }
+        Ok(Stepped { time: reached, early: early != fmi3False, event: event != fmi3False })
+    }
+
     /// Adds the end time to the error of a discarded step if the FMU requests the end of the simulation (section 4.2.3 of FMI 2.0).
     #[cold]
     fn ended(&self, rejection: Rejection, time: f64) -> Rejection {
@@ -525,40 +552,55 @@ impl Instance {
     pub fn event(&mut self) -> Result<Event, Rejection> {
         let mut all = Event::default();
         for _ in 0..MOST_ITERATIONS {
-            let mut of_fmi2 = fmi2EventInfo::default();
-            let [mut again, mut terminate, mut nominals, mut states, mut is_next] = [fmi3False; 5];
-            let mut next = 0.0;
-            call!(
-                self,
-                fmi2NewDiscreteStates(&mut of_fmi2),
-                fmi3UpdateDiscreteStates(
-                    &mut again,
-                    &mut terminate,
-                    &mut nominals,
-                    &mut states,
-                    &mut is_next,
-                    &mut next
-                )
-            )?;
-            if self.standard() == Standard::Fmi2 {
-                let boolean = |value: fmi2Boolean| fmi3Boolean::from(value != fmi2False);
-                again = boolean(of_fmi2.new_discrete_states_needed);
-                terminate = boolean(of_fmi2.terminate_simulation);
-                nominals = boolean(of_fmi2.nominals_of_continuous_states_changed);
-                states = boolean(of_fmi2.values_of_continuous_states_changed);
-                is_next = boolean(of_fmi2.next_event_time_defined);
-                next = of_fmi2.next_event_time;
-            }
-            all.terminate |= terminate != fmi3False;
-            all.nominals_changed |= nominals != fmi3False;
-            all.states_changed |= states != fmi3False;
-            all.next = (is_next != fmi3False).then_some(next);
-            if again == fmi3False || all.terminate {
+            if !self.update_discrete_states(&mut all)? {
                 return Ok(all);
             }
         }
-        Err(self
-            .own_rejection("event", format!("the event does not end within {MOST_ITERATIONS} iterations")))
+        Err(self.endless_event())
+    }
+
+    /// Returns the error for an event that does not end.
+    #[cold]
+    pub fn endless_event(&self) -> Rejection {
+        self.own_rejection("event", format!("the event does not end within {MOST_ITERATIONS} iterations"))
+    }
+
+    /// Updates the discrete states once. Adds the result to that of the event's earlier iterations, and returns whether the event needs
+    /// a further one.
+    ///
+    /// # Errors
+    /// The FMU rejects the call.
+    #[inline]
+    pub fn update_discrete_states(&mut self, all: &mut Event) -> Result<bool, Rejection> {
+        let mut of_fmi2 = fmi2EventInfo::default();
+        let [mut again, mut terminate, mut nominals, mut states, mut is_next] = [fmi3False; 5];
+        let mut next = 0.0;
+        call!(
+            self,
+            fmi2NewDiscreteStates(&mut of_fmi2),
+            fmi3UpdateDiscreteStates(
+                &mut again,
+                &mut terminate,
+                &mut nominals,
+                &mut states,
+                &mut is_next,
+                &mut next
+            )
+        )?;
+        if self.standard() == Standard::Fmi2 {
+            let boolean = |value: fmi2Boolean| fmi3Boolean::from(value != fmi2False);
+            again = boolean(of_fmi2.new_discrete_states_needed);
+            terminate = boolean(of_fmi2.terminate_simulation);
+            nominals = boolean(of_fmi2.nominals_of_continuous_states_changed);
+            states = boolean(of_fmi2.values_of_continuous_states_changed);
+            is_next = boolean(of_fmi2.next_event_time_defined);
+            next = of_fmi2.next_event_time;
+        }
+        all.terminate |= terminate != fmi3False;
+        all.nominals_changed |= nominals != fmi3False;
+        all.states_changed |= states != fmi3False;
+        all.next = (is_next != fmi3False).then_some(next);
+        Ok(again != fmi3False && !all.terminate)
     }
 
     /// Tells the FMU that an integrator step is complete. Returns whether the FMU requests an event, and whether it requests the end

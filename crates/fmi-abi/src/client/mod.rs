@@ -26,11 +26,13 @@
 //! ```
 //!
 //! [`load`] loads the functions of an FMU, and [`Instance`] calls them. Module `instance` contains the life cycle, steps, events
-//! and derivatives, `values` gets and sets variables, and `states` saves and restores states, whose handles are stored in `saved`.
+//! and derivatives, `clocks` ticks clocks, `values` gets and sets variables, and `states` saves and restores states, whose handles are
+//! stored in `saved`.
 //! `log` receives messages and keeps a list of the living instances, because the pointer that an FMU passes to the logger cannot be
 //! trusted. `format` expands `printf` formats, whose arguments cannot be trusted either. `rejection` contains the errors, and
 //! `float` restores the floating-point environment after calls in which some FMUs change it.
 
+mod clocks;
 mod float;
 mod format;
 mod instance;
@@ -42,7 +44,8 @@ mod states;
 mod values;
 
 pub use crate::calls::{Library, LoadError};
-pub use instance::{Continuous, Event, Instance, Settings};
+pub use clocks::{Interval, Qualifier};
+pub use instance::{Continuous, Event, Instance, MOST_ITERATIONS, Settings, Stepped};
 pub use library::load;
 pub use log::{LogListener, VariableNames};
 pub use rejection::{Message, Rejection, reason};

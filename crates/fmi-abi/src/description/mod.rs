@@ -1,12 +1,14 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
 //! standard or stay empty, and each [`Fault`] is listed. An attribute whose value cannot be read is such a fault.
 
+mod clock;
 mod faults;
 mod offer;
 mod read;
 mod variable;
 
 use crate::{DependencyKind, Interface, Standard, Unit};
+pub use clock::{Clock, Timing};
 pub use faults::Fault;
 pub use offer::Offer;
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,6 +1,7 @@
 //! Variables of model descriptions.
 
-use crate::{BaseType, Causality, Initial, Variability};
+use super::Clock;
+use crate::{BaseType, Causality, Initial, IntervalVariability, Variability};
 use std::sync::Arc;
 
 /// A variable; an array of FMI 3.0 is one variable.
@@ -51,11 +52,12 @@ pub struct Variable {
     pub reinit: bool,
     /// Whether the variable is clocked (attribute `clocks`).
     pub clocked: bool,
+    /// Value references of the clocks of a clocked variable.
+    pub clocks: Vec<u32>,
     /// Whether the variable may be set only once per time instant.
     pub once_per_instant: bool,
-    /// Whether the variable is an input clock that the importer must activate at times that follow from its interval: a clock whose
-    /// `intervalVariability` is not `triggered` (section 2.2.8.1 of FMI 3.0).
-    pub is_periodic: bool,
+    /// Attributes of a clock; `None` for any other variable.
+    pub clock: Option<Box<Clock>>,
     /// Description; empty if missing.
     pub description: String,
     /// Further names of the variable (section 2.4.7 of FMI 3.0).
@@ -121,6 +123,13 @@ impl Variable {
     pub fn is_settable(&self) -> bool {
         let is_exact = self.initial == Some(Initial::Exact) && self.variability != Variability::Constant;
         self.causality == Causality::Input || is_exact
+    }
+
+    /// Returns whether the variable is an input clock that the importer must activate at times that follow from its interval: a clock
+    /// whose `intervalVariability` is not `triggered` (section 2.2.8.2 of FMI 3.0).
+    pub fn is_time_based(&self) -> bool {
+        let of_clock = |clock: &Clock| clock.interval_variability != Some(IntervalVariability::Triggered);
+        self.causality == Causality::Input && self.clock.as_deref().is_some_and(of_clock)
     }
 
     /// Returns whether the values are floating-point numbers.

@@ -4,7 +4,7 @@ use super::definitions::Declared;
 use super::{attribute_or_empty, base_of, elements};
 use crate::attribute::value;
 use crate::description::faults::{Fault, Faults};
-use crate::description::{Alias, MAX_VALUES, Variable};
+use crate::description::{Alias, Clock, MAX_VALUES, Variable};
 use crate::{BaseType, Causality, Initial, Standard, Variability, shown};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
@@ -179,10 +179,9 @@ fn variable(
         derivative_of: None,
         reinit: faults.read(of_type, "reinit") == Some(true),
         clocked: node.attribute("clocks").is_some(),
+        clocks: faults.read_list(node, "clocks").unwrap_or_default(),
         once_per_instant: faults.read(node, "canHandleMultipleSetPerTimeInstant") == Some(false),
-        is_periodic: node.has_tag_name("Clock")
-            && causality == Causality::Input
-            && node.attribute("intervalVariability").map(str::trim) != Some("triggered"),
+        clock: node.has_tag_name("Clock").then(|| Box::new(Clock::read(node, faults))),
         description: attribute_or_empty(node, "description"),
         aliases: node.children().filter(|child| child.has_tag_name("Alias")).map(alias).collect(),
     }
