@@ -138,7 +138,7 @@ def test_arguments(wrist, controller):
         interface="model_exchange",
         solver="euler",
     )
-    wrong("solver, rtol, atol, max_step and events are for Model Exchange", rtol=1e-6)
+    wrong("solver, rtol, atol and max_step are for Model Exchange", rtol=1e-6)
     wrong("rtol is 0; it must be above 0", interface="model_exchange", rtol=0.0)
     wrong("read_before_set is for Co-Simulation", interface="model_exchange", read_before_set=True)
     wrong('theta1 is "sin"; the value of a number is a number', inputs={"theta1": "sin"})

@@ -50,6 +50,8 @@ pub struct Attributes {
     /// For an output, the variables on which it depends directly, that is, on their values at the same instant. `None` if they are not
     /// declared; then the output may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Dependencies>,
+    /// Value references of the clocks of a clocked variable; empty for any other variable.
+    pub clocks: Vec<u32>,
     /// Description.
     pub description: String,
 }
@@ -100,6 +102,10 @@ pub struct Description {
     /// Variables, in the order of the model description, and after them their aliases (section 2.4.7 of FMI 3.0), each of which is a
     /// variable with the same value reference.
     pub variables: Vec<Variable>,
+    /// Clocked variables, which are not among `variables` because they have values only while a clock is active. An array has several.
+    pub clocked: Vec<Variable>,
+    /// Indices of the clocks among the variables of the file.
+    clocks: Vec<usize>,
     /// Number of continuous states.
     pub states: usize,
     /// Number of event indicators.
@@ -187,11 +193,11 @@ impl Description {
             .sum();
         fmi_abi::xml::reserve(arrays.bytes())
             .map_err(|why| format!("modelDescription.xml cannot be read: {why}"))?;
-        let mut variables = Vec::with_capacity(count);
+        let (mut variables, mut clocked) = (Vec::with_capacity(count), Vec::new());
         let mut spans = Vec::with_capacity(elements.len());
         for (of, elements) in written.variables.iter().zip(elements) {
             let begin = variables.len();
-            spread(of, elements, &arrays, &mut variables);
+            spread(of, elements, &arrays, if of.clocked { &mut clocked } else { &mut variables });
             spans.push(begin..variables.len());
         }
         relate(&written, &spans, &mut variables);
@@ -202,6 +208,10 @@ impl Description {
             arrays: Arc::new(arrays),
             indices: Index::of(variables.iter().map(|of| of.name.as_str())),
             variables,
+            clocked,
+            clocks: (0..written.variables.len())
+                .filter(|index| written.variables[*index].clock.is_some())
+                .collect(),
             spans,
             written,
             structure,
@@ -221,9 +231,12 @@ impl Description {
         let is_named = |of: &&Declared| of.name == name || of.aliases.iter().any(|alias| alias.name == name);
         let of = self.written.variables.iter().find(is_named)?;
         match (of.base, &of.dimensions) {
-            (None, _) => Some("is a clock, and clocks are not supported here; FMPy sets and reads them"),
+            (None, _) => Some(
+                "is a clock; only the function run, for a single FMU, ticks clocks, and lists their ticks as events",
+            ),
             _ if of.clocked => Some(
-                "has a value only while its clock ticks, and clocks are not supported here; FMPy reads it",
+                "has a value only while its clock ticks; only the function run, for a single FMU, sets it as an input and reads it as an \
+                output",
             ),
             (_, Some(sizes)) if sizes.is_empty() => None,
             (_, None) if !of.is_too_large => Some("is an array of unknown size"),
@@ -237,8 +250,18 @@ impl Description {
 
     /// Returns the name of a clock without whose ticks the FMU does not calculate what it should. A triggered input clock ticks only
     /// when the importer wants it to.
-    pub(crate) fn unsupported_clock(&self) -> Option<&str> {
-        self.written.variables.iter().find(|of| of.is_periodic).map(|of| of.name.as_str())
+    pub(crate) fn needed_clock(&self) -> Option<&str> {
+        self.written_clocks().find(|of| of.is_time_based()).map(|of| of.name.as_str())
+    }
+
+    /// Returns the clocks of the file.
+    pub(crate) fn written_clocks(&self) -> impl Iterator<Item = &Declared> {
+        self.clocks.iter().map(|index| &self.written.variables[*index])
+    }
+
+    /// Returns the clocked variable with this name, if there is one.
+    pub(crate) fn clocked(&self, name: &str) -> Option<&Variable> {
+        self.clocked.iter().find(|of| of.name == name)
     }
 
     /// Returns the variable with this name, if there is one.
@@ -409,12 +432,8 @@ pub(crate) fn key_of(base: BaseType, reference: u32) -> u64 {
 }
 
 /// Adds the elements of an array to `arrays` and returns their value references. Returns a meaningless range of length 1 for a
-/// scalar, and `None` for a clock or an array whose size is unknown or too large. Also returns `None` for a clocked variable, because it
-/// can be set and read only while its clock is active, and in Initialization Mode (section 2.2.8.3 of FMI 3.0).
+/// scalar, and `None` for a clock or an array whose size is unknown or too large.
 fn elements_of(of: &Declared, arrays: &mut Arrays) -> Option<Range<u32>> {
-    if of.clocked {
-        return None;
-    }
     let (base, sizes) = (of.base?, of.dimensions.as_ref()?);
     let names = || std::iter::once(&*of.name).chain(of.aliases.iter().map(|alias| &*alias.name));
     match sizes.is_empty() {
@@ -437,6 +456,7 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         display_unit: given(&of.display_unit),
         is_relative: of.is_relative,
         depends_on: None,
+        clocks: of.clocks.clone(),
         description: of.description.clone(),
     });
     let variable = |name, reference, start| Variable {

@@ -80,12 +80,12 @@ impl Tolerance {
 }
 
 impl Instance {
-    /// Creates an instance of a component for an interface type, and sets structural parameters. The error contains the reason, and
+    /// Creates an instance of a component for an interface type, in Co-Simulation with event mode or without, and sets structural parameters. The error contains the reason, and
     /// whether the FMU logged no message.
     pub(crate) fn new(
         fmu: &Loaded,
         (index, component): (usize, &str),
-        interface: Interface,
+        (interface, event_mode): (Interface, bool),
         logging: &Logging,
     ) -> Result<Self, (String, bool)> {
         let library = fmu.library(interface).map_err(|error| (error.to_string(), false))?;
@@ -95,6 +95,8 @@ impl Instance {
             token: &fmu.description.token,
             resources: library.resources.as_deref(),
             logging_on: logging.on,
+            event_mode,
+            early_return: event_mode,
             listener: logging.listener(index),
             names: Some(Arc::clone(&fmu.description) as Arc<dyn VariableNames>),
             ..Settings::new(interface)

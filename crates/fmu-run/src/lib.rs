@@ -3,13 +3,14 @@
 //! ## Structure of the crate
 //!
 //! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors; [`Instances`] are
-//! stateful and controlled by the caller. The module `continuous` integrates runs in Model Exchange. In `description`, array elements
-//! are variables, which `instance` and `values` read and set through `fmi_abi::client`. A caller needs `unsafe` only to open an
+//! stateful and controlled by the caller. The module `continuous` integrates runs in Model Exchange, and `clocks` ticks the clocks of
+//! FMI 3.0 in runs. In `description`, array elements are variables, which `instance` and `values` read and set through `fmi_abi::client`. A caller needs `unsafe` only to open an
 //! [FMU](Fmu::open) or a [system](System::open).
 
 mod arrays;
 mod batch;
 mod change;
+mod clocks;
 mod connector;
 mod continuous;
 mod description;

@@ -70,22 +70,22 @@ impl SystemInstance {
     pub fn renewed(
         used: Option<Self>,
         system: &System,
-        interface: Interface,
+        mode: (Interface, bool),
         logging: &Logging,
     ) -> Result<Self, (String, bool)> {
         // If an FMU cannot be reset, the old instances are freed before new ones are created, because some FMUs permit only one.
         match used.and_then(Self::reset) {
             Some(used) => Ok(used),
-            None => Self::new(system, interface, logging),
+            None => Self::new(system, mode, logging),
         }
     }
 
-    /// Creates new instances. The error contains the reason, and whether the FMU logged no message.
-    pub fn new(system: &System, interface: Interface, logging: &Logging) -> Result<Self, (String, bool)> {
+    /// Creates new instances for an interface type, in Co-Simulation with event mode or without. The error contains the reason, and whether
+    /// the FMU logged no message.
+    pub fn new(system: &System, mode: (Interface, bool), logging: &Logging) -> Result<Self, (String, bool)> {
         let components = system.components().iter().enumerate();
-        let components = components.map(|(index, component)| {
-            Instance::new(&component.fmu, (index, &component.name), interface, logging)
-        });
+        let components = components
+            .map(|(index, component)| Instance::new(&component.fmu, (index, &component.name), mode, logging));
         Ok(Self::of(system, components.collect::<Result<_, _>>()?))
     }
 

@@ -597,11 +597,14 @@ int fmi3GetAdjointDerivative(void *c, const uint32_t *u, size_t nu, const uint32
 }
 /* Functions that reject any call, whatever their other arguments are. */
 #define REJECTED(name) int name(void *c) { return c ? reject(c, "not supported") : ERROR; }
-REJECTED(fmi2GetRealOutputDerivatives) REJECTED(fmi2CancelStep) REJECTED(fmi3GetClock) REJECTED(fmi3SetClock)
-REJECTED(fmi3GetNumberOfVariableDependencies) REJECTED(fmi3GetVariableDependencies) REJECTED(fmi3GetIntervalDecimal)
-REJECTED(fmi3GetIntervalFraction) REJECTED(fmi3GetShiftDecimal) REJECTED(fmi3GetShiftFraction) REJECTED(fmi3SetIntervalDecimal)
-REJECTED(fmi3SetIntervalFraction) REJECTED(fmi3SetShiftDecimal) REJECTED(fmi3SetShiftFraction) REJECTED(fmi3EvaluateDiscreteStates)
-REJECTED(fmi3GetOutputDerivatives) REJECTED(fmi3ActivateModelPartition)
+REJECTED(fmi2GetRealOutputDerivatives) REJECTED(fmi2CancelStep) REJECTED(fmi3GetNumberOfVariableDependencies)
+REJECTED(fmi3GetVariableDependencies) REJECTED(fmi3SetIntervalDecimal) REJECTED(fmi3SetIntervalFraction)
+REJECTED(fmi3SetShiftDecimal) REJECTED(fmi3SetShiftFraction) REJECTED(fmi3EvaluateDiscreteStates) REJECTED(fmi3GetOutputDerivatives)
+REJECTED(fmi3ActivateModelPartition)
+#ifndef CLOCKS /* A model with clocks defines these functions. */
+REJECTED(fmi3GetClock) REJECTED(fmi3SetClock) REJECTED(fmi3GetIntervalDecimal) REJECTED(fmi3GetIntervalFraction)
+REJECTED(fmi3GetShiftDecimal) REJECTED(fmi3GetShiftFraction)
+#endif
 void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 int fmi2SetRealInputDerivatives(void *c, const uint32_t *vr, size_t n, const int *order, const double *value) {
     ALLOW(ANY)

@@ -51,9 +51,11 @@ class Loaded:
         tolerances: tuple[_Number, _Number, _Number],
         events: bool,
         reuse: bool,
+        clocks: Mapping[str, Any] | None,
+        hold: bool,
     ) -> tuple[
         _Array,
-        list[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None]],
+        list[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None, bool]],
         _Array,
         list[str],
         _Array | None,
@@ -61,7 +63,7 @@ class Loaded:
         list[tuple[int, str]],
         dict[str, Any],
         dict[str, tuple[tuple[int, ...], list[str]]],
-        list[tuple[int, float, list[float], list[float]]],
+        list[tuple[int, float, list[float], list[float], list[str]]],
         BaseException | None,
     ]: ...
 

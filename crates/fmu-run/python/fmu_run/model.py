@@ -82,7 +82,7 @@ class Model:
     @cached_property
     def variables(self) -> dict[str, Variable]:
         """The variables by name, in the order of the model description. As in FMI 2.0, each element of an array of FMI 3.0 is a
-        variable: T[3]. Clocks are omitted. The first access takes about 2 s for a million elements."""
+        variable: T[3]. Clocks and variables that have clocks are omitted. The first access takes about 2 s for a million elements."""
         return self._variables.dict(Variable)
 
     def close(self) -> None:
@@ -111,6 +111,8 @@ class Model:
         max_step: float | None = None,
         events: bool = False,
         reuse: bool = False,
+        clocks: Mapping[str, ArrayLike] | None = None,
+        hold: bool = False,
     ) -> Runs:
         """Run the FMU once, or several times if an argument has a separate value for each run.
 
@@ -180,11 +182,19 @@ class Model:
             Largest step of the solver, s. Event indicators are evaluated at the ends of steps and at communication points. Choose
             `max_step` so that no indicator changes its sign twice between two such times, because these events are not detected.
         events
-            Store the outputs before and after each event in `Runs.events`.
+            Store the outputs before and after each event in `Runs.events`: in Model Exchange, and in Co-Simulation if the FMU has event mode
+            (FMI 3.0). Steps of Co-Simulation then end at events.
         reuse
             Let a run reset the instance of an earlier run, even of an earlier call, instead of creating one. This saves time if the FMU
             takes long to create an instance. Use it only if the reset of the FMU is complete, because otherwise something of one run
-            affects the next; `fmu-check` tests that. It has no effect with `log`, so that the messages of each run are complete.
+            affects the next; `fmu-check` tests that. It has no effect with `log`, so that the messages of each run are complete, and in runs
+            with clocks or with events in Co-Simulation.
+        clocks
+            Times of the ticks of triggered input clocks by name, s: {"pressed": [0.2, 0.7]}. All other input clocks tick at the times
+            that follow from their intervals. A clocked input has the value at the time of the tick.
+        hold
+            Whether an output that has a clock keeps the value of the last tick until the next one. Otherwise it is NaN at communication
+            points at which its clock does not tick. Before the first tick, it is always NaN.
 
         Returns
         -------
@@ -230,6 +240,8 @@ class Model:
             (rtol, atol, max_step),
             events,
             reuse,
+            clocks,
+            hold,
         )
         self._warn_of_unused(_items("inputs", inputs), _items("start", start), interface or "co-simulation")
         runs, raised = Runs(*found[:-1]), found[-1]

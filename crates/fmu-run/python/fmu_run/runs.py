@@ -23,7 +23,7 @@ AT_START = " at start"
 
 
 class Event(NamedTuple):
-    """An event in Model Exchange.
+    """An event.
 
     Parameters
     ----------
@@ -36,12 +36,15 @@ class Event(NamedTuple):
         such as y[1].
     after
         The same just after the event.
+    clocks
+        Names of the clocks that ticked. Outputs that have one of them have the values of the tick in `after`.
     """
 
     run: int
     time: float
     before: dict[str, float]
     after: dict[str, float]
+    clocks: list[str]
 
 
 class _Column(NamedTuple):
@@ -54,6 +57,8 @@ class _Column(NamedTuple):
     first: int | None
     #: (runs, times, ...): the values if float64 cannot represent them.
     exact: NDArray[Any] | None
+    #: Whether it has values only while a clock is active, so that NaN is not a fault.
+    clocked: bool
 
     def of_elements(self) -> Iterator[_Column]:
         for number, element in enumerate(self.elements):
@@ -61,7 +66,7 @@ class _Column(NamedTuple):
             exact = self.exact
             if exact is not None:
                 exact = exact.reshape(*exact.shape[:2], -1)[..., number]
-            yield _Column(element, (), [element], first, exact)
+            yield _Column(element, (), [element], first, exact, self.clocked)
 
 
 class Runs(Mapping[str, _Array]):
@@ -89,7 +94,7 @@ class Runs(Mapping[str, _Array]):
     def __init__(
         self,
         time: _Array,
-        columns: Iterable[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None]],
+        columns: Iterable[tuple[str, tuple[int, ...], list[str], int | None, NDArray[Any] | None, bool]],
         trajectories: _Array,
         measures: Sequence[str],
         measured: _Array | None,
@@ -97,7 +102,7 @@ class Runs(Mapping[str, _Array]):
         notes: Iterable[tuple[int, str]],
         start: Mapping[str, Any],
         arrays: Mapping[str, tuple[tuple[int, ...], list[str]]],
-        events: Iterable[tuple[int, float, list[float], list[float]]] = (),
+        events: Iterable[tuple[int, float, list[float], list[float], list[str]]] = (),
     ):
         self.time, self._errors, self.notes = time, dict(errors), dict(notes)
         self._reported, self._checked = not self._errors, set[str | tuple[str, str]]()
@@ -111,11 +116,11 @@ class Runs(Mapping[str, _Array]):
 
     @cached_property
     def events(self) -> list[Event]:
-        """The events of all runs in Model Exchange, sorted by run and time. Empty unless `Fmu.run` was called with events=True."""
+        """The events of all runs, sorted by run and time. Empty unless `Fmu.run` was called with events=True."""
         names = [element for column in self._outputs if column.first is not None for element in column.elements]
         return [
-            Event(run, time, dict(zip(names, before, strict=True)), dict(zip(names, after, strict=True)))
-            for run, time, before, after in self._events
+            Event(run, time, dict(zip(names, before, strict=True)), dict(zip(names, after, strict=True)), clocks)
+            for run, time, before, after, clocks in self._events
         ]
 
     @cached_property
@@ -192,17 +197,17 @@ class Runs(Mapping[str, _Array]):
             found = columns.reshape(*columns.shape[:2], *column.shape)
         if measure:
             found = found[:, 0]
-        self._announce(key, found)
+        self._announce(key, found, column.clocked)
         return found
 
-    def _announce(self, key: str | tuple[str, str], values: _Array) -> None:
-        """Warn about failed runs, unless the caller has read `errors`, and about NaN in other runs."""
+    def _announce(self, key: str | tuple[str, str], values: _Array, clocked: bool) -> None:
+        """Warn about failed runs, unless the caller has read `errors`, and about NaN in other runs, unless the output has a clock."""
         lines = []
         if not self._reported:
             number, why = next(iter(self._errors.items()))
             count = "all" if len(self._errors) == self.count else f"{len(self._errors)} of {self.count}"
             lines.append(f"{count} runs failed, see Runs.errors; run {number}: {why}")
-        if key not in self._checked:
+        if not clocked and key not in self._checked:
             bad: NDArray[np.bool_] = np.asarray(np.isnan(values).reshape(self.count, -1).any(axis=1))
             bad[list(self._errors)] = False
             if bad.any():

@@ -10,7 +10,7 @@ mod start;
 
 use buffers::{Numbers, Output};
 use fmu_run::{
-    Batch, Composition, Elements, Error, Finished, Fmu, Order, Planned, Size, System, Unit, Watch,
+    Batch, Composition, Elements, Error, Finished, Fmu, Occurrence, Order, Planned, Size, System, Unit, Watch,
 };
 use log::Log;
 use pyo3::create_exception;
@@ -59,11 +59,12 @@ type Stages = Vec<Pairs>;
 /// Messages by index of the run.
 type Messages = Vec<(usize, String)>;
 /// An output: name; shape and element names of a whole array; its first column in trajectories, statistics and events, or, for values that
-/// float64 cannot represent, the values, (runs, times, ...).
-type Column<'py> = (String, Bound<'py, PyTuple>, Vec<String>, Option<usize>, Option<Bound<'py, PyAny>>);
+/// float64 cannot represent, the values, (runs, times, ...); whether it has values only while a clock is active.
+type Column<'py> = (String, Bound<'py, PyTuple>, Vec<String>, Option<usize>, Option<Bound<'py, PyAny>>, bool);
+/// Run, time, columns before and after, and names of the clocks that ticked.
+type Event = (usize, f64, Vec<f64>, Vec<f64>, Vec<String>);
 /// Stored times; outputs; trajectories, (runs, columns, times); names and values of statistics, (runs, columns, statistics); errors; notes;
-/// start values; shapes and element names of the whole arrays among the start values; events, each with run, time, and columns before and
-/// after; the exception that has stopped the runs.
+/// start values; shapes and element names of the whole arrays among the start values; events; the exception that has stopped the runs.
 type Results<'py> = (
     Bound<'py, PyAny>,
     Vec<Column<'py>>,
@@ -74,7 +75,7 @@ type Results<'py> = (
     Messages,
     Bound<'py, PyDict>,
     Bound<'py, PyDict>,
-    Vec<(usize, f64, Vec<f64>, Vec<f64>)>,
+    Vec<Event>,
     Option<PyErr>,
 );
 
@@ -276,10 +277,12 @@ impl Loaded {
         tolerances: [Option<Bound<'py, PyAny>>; 3],
         events: Bound<'py, PyAny>,
         reuse: Bound<'py, PyAny>,
+        clocks: Option<Bound<'py, PyAny>>,
+        hold: Bound<'py, PyAny>,
     ) -> PyResult<Results<'py>> {
         let (model, start) = Start::configured(self.model()?.system(), start.as_ref())?;
         let log = Log::of(log.as_ref())?;
-        let time = times(&time)?;
+        let time = one_dimension("time", &time)?;
         let measures = arguments::names("measures", &measures)?;
         let outputs = arguments::names("outputs", &outputs)?;
         let given = |name, values: Option<&Bound<'py, PyAny>>, are_rates| {
@@ -287,6 +290,9 @@ impl Loaded {
         };
         let inputs = given("inputs", inputs.as_ref(), false)?;
         let input_derivatives = given("input_derivatives", input_derivatives.as_ref(), true)?;
+        let clocks = arguments::items("clocks", clocks.as_ref())?;
+        let ticks = clocks.iter().map(|(name, times)| Ok((name, one_dimension(name, times)?)));
+        let ticks = ticks.collect::<PyResult<Vec<_>>>()?;
         let every = arguments::count("every", every.as_ref())?;
         arguments::callable("progress", progress.as_ref())?;
         let arrays = Arrays::of(&model, outputs.iter().map(String::as_str));
@@ -306,6 +312,8 @@ impl Loaded {
             interface: interface.as_ref().map(arguments::interface).transpose()?,
             integration: arguments::integration(&solver, tolerances.each_ref().map(Option::as_ref))?,
             events: arguments::flag("events", &events)?,
+            clocks: ticks.iter().map(|(name, times)| (name.as_str(), times.values())).collect(),
+            hold: arguments::flag("hold", &hold)?,
         };
         let planned = model.plan(&batch).map_err(python)?;
         let columns = arrays.columns(&outputs, planned.columns())?;
@@ -327,11 +335,12 @@ impl Loaded {
         let results = [kept.values(), measured_values];
         let (Finished { errors, notes, exact, events }, raised) =
             perform(py, &planned, results, progress.map(Bound::unbind), log)?;
-        let columns = columns.iter().map(|of| of.with_values(py, size, &exact)).collect::<PyResult<_>>()?;
+        let columns =
+            columns.iter().map(|of| of.with_values(py, size, &exact, &model)).collect::<PyResult<_>>()?;
         let measured = measured.map(|(array, _)| array);
         let (arrays, start) = (Arrays::of(&model, start.names()).dict(py)?, start.dict(py)?);
-        let events =
-            events.into_iter().map(|event| (event.run, event.time, event.before, event.after)).collect();
+        let event = |of: Occurrence| (of.run, of.time, of.before, of.after, of.clocks);
+        let events = events.into_iter().map(event).collect();
         Ok((times, columns, trajectories, measures, measured, errors, notes, start, arrays, events, raised))
     }
 }
@@ -351,6 +360,7 @@ impl Columns<'_> {
         py: Python<'py>,
         size: Size,
         all: &[Option<fmu_run::Value>],
+        system: &System,
     ) -> PyResult<Column<'py>> {
         let (first, values) = match self.first {
             fmu_run::Column::Number(first) => (Some(first), None),
@@ -365,7 +375,9 @@ impl Columns<'_> {
                 (None, Some(exact::array(py, base, &values.collect::<Vec<_>>(), &shape)?))
             }
         };
-        Ok((self.name.to_owned(), PyTuple::new(py, self.sizes)?, self.elements.to_vec(), first, values))
+        let is_clocked = self.elements.first().is_some_and(|element| system.is_clocked(element));
+        let (name, sizes) = (self.name.to_owned(), PyTuple::new(py, self.sizes)?);
+        Ok((name, sizes, self.elements.to_vec(), first, values, is_clocked))
     }
 }
 
@@ -424,12 +436,12 @@ impl<'a> Arrays<'a> {
     }
 }
 
-fn times(given: &Bound<'_, PyAny>) -> PyResult<Numbers> {
-    let time = Numbers::of("time", given)?;
-    match time.shape().len() {
-        1 => Ok(time),
+fn one_dimension(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Numbers> {
+    let numbers = Numbers::of(name, given)?;
+    match numbers.shape().len() {
+        1 => Ok(numbers),
         dimensions => {
-            Err(PyValueError::new_err(format!("time must have one dimension, it has {dimensions}")))
+            Err(PyValueError::new_err(format!("{name} must have one dimension, it has {dimensions}")))
         }
     }
 }

@@ -27,8 +27,9 @@ pub(super) fn each_input<'a, 's>(
     mut numeric: impl FnMut(&'a str, Trajectory<'a>, Vec<Found<'s>>) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let mut names = Vec::new();
-    for (name, trajectory) in &batch.inputs {
-        let variables = input(system, name)?;
+    for (name, trajectory) in batch.inputs.iter().filter(|(name, _)| !system.is_clocked(name)) {
+        let variables = system.find(name)?;
+        input_of(name, &variables)?;
         once(&mut names, name, "inputs")?;
         if is_exact(variables[0].variable.base) {
             exact.push(Input::of(name, &variables, *trajectory, batch.time)?);
@@ -39,9 +40,8 @@ pub(super) fn each_input<'a, 's>(
     Ok(())
 }
 
-/// Finds the variables of an input, or of another variable that may be set during a run.
-fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
-    let variables = system.find(name)?;
+/// Fails unless the variables with a name are an input, or another variable that may be set during a run.
+pub(super) fn input_of(name: &str, variables: &[Found]) -> Result<(), Error> {
     variables.iter().try_for_each(|found| found.check_own(name))?;
     let of = variables[0].variable;
     if !of.is_settable() || of.is_structural() || of.variability == Some(Variability::Fixed) {
@@ -55,7 +55,7 @@ fn input<'s>(system: &'s System, name: &str) -> Result<Vec<Found<'s>>, Error> {
         };
         return request(format!("{name} is not an input but {}{hint}", article(&kind)));
     }
-    Ok(variables)
+    Ok(())
 }
 
 /// Returns whether values of a variable are held between the times at which they are given; otherwise they are interpolated.

@@ -1,5 +1,7 @@
 //! Batches: many runs of an FMU or a system.
 
+mod event_plan;
+mod events;
 mod exact;
 mod input_rows;
 mod inputs;
@@ -66,8 +68,15 @@ pub struct Batch<'a> {
     pub interface: Option<Interface>,
     /// Solver and tolerances, in Model Exchange.
     pub integration: Integration,
-    /// Whether the outputs before and after each event are kept in [`Runs::events`], in Model Exchange.
+    /// Whether the outputs before and after each event are kept in [`Runs::events`], in Model Exchange, and in Co-Simulation of an FMU
+    /// with event mode (FMI 3.0). Steps of Co-Simulation then end at events.
     pub events: bool,
+    /// Times of the ticks of triggered input clocks, s. They must increase. All other input clocks tick at the times that follow from
+    /// their intervals.
+    pub clocks: Vec<(&'a str, &'a [f64])>,
+    /// Whether an output with a clock keeps the value of the last tick at the communication points until the next tick. Otherwise it is
+    /// NaN, unless the clock ticks at the communication point.
+    pub hold: bool,
 }
 
 /// Values of an input.
@@ -181,8 +190,8 @@ pub struct Runs {
     pub events: Vec<Occurrence>,
 }
 
-/// An event in Model Exchange, with the outputs before and after it.
-#[derive(Clone, Debug, PartialEq)]
+/// An event, with the outputs before and after it.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Occurrence {
     /// Index of the run.
     pub run: usize,
@@ -196,6 +205,8 @@ pub struct Occurrence {
     pub states: Vec<usize>,
     /// Whether the FMU has reported that states have changed.
     pub states_changed: bool,
+    /// Names of the clocks that have ticked.
+    pub clocks: Vec<String>,
 }
 
 impl System {

@@ -1,11 +1,13 @@
 //! Runs in Model Exchange.
 
 use super::Occurrence;
+use super::event_plan::EventPlan;
 use super::model_exchange_plan::ModelExchangePlan;
 use super::worker::{Kept, Stopped, Worker};
+use crate::clocks::Ticking;
 use crate::continuous::{Hooks, Model, Simulation, Solver};
 use crate::system_instance::SystemInstance;
-use fmi_abi::client::{Continuous, Rejection};
+use fmi_abi::client::{Continuous, Event, Rejection};
 
 impl<'a> Worker<'a> {
     /// Runs an instance in Model Exchange from the start values to the last time. `follow` is its counterpart in Co-Simulation.
@@ -29,15 +31,26 @@ impl<'a> Worker<'a> {
         let retries = integration.solver != Solver::Rk4;
         let model = Model::new(instance, description, inputs, [moving, held], retries);
         model.parts().begin(times[0]).map_err(before)?;
+        let of_clocks = |events: &'a EventPlan<'a>| {
+            Ticking::new(&events.clocks, events.inputs(run, plan.time), plan.time)
+        };
+        let mut ticking = plan.events.as_deref().map(of_clocks);
+        if let Some(ticking) = &mut ticking {
+            ticking.begin(model.parts().instance).map_err(before)?;
+        }
         model.parts().instance.exit_initialization_mode().map_err(before)?;
         model.parts().instance.forget_log();
         let sizes = [description.states, description.event_indicators];
         let mut simulation = Simulation::new(times, sizes, integration, *rtol, *reports_steps);
         let mut kept = Kept::of(plan);
         let mut observed = Observed { worker: self, times, trajectories, kept: &mut kept, run, event: None };
-        let result = simulation.run(&model, &mut observed);
+        let result = match &mut ticking {
+            None => simulation.run(&model, &mut observed),
+            Some(ticking) => simulation.run(&model, &mut Ticked { observed, ticking, has_begun: false }),
+        };
         result.map_err(|rejection| {
             if let Some(end) = rejection.ended() {
+                ticking.iter().for_each(|ticking| ticking.show(end, &mut self.row));
                 self.end(model.parts().instance, times, (simulation.next, end), &mut kept, trajectories);
             }
             (simulation.next.checked_sub(1).map(|index| (index, simulation.time)), rejection)
@@ -46,7 +59,7 @@ impl<'a> Worker<'a> {
 
     /// Reads the outputs at the end of a run that the FMU has ended. They belong to the results if the end is at a communication
     /// point.
-    fn end(
+    pub(super) fn end(
         &mut self,
         instance: &mut SystemInstance,
         times: &[f64],
@@ -104,13 +117,11 @@ impl Hooks for Observed<'_, '_> {
             return Ok(());
         }
         let outputs = &self.worker.plan.outputs;
-        let mut row = vec![0.0; outputs.len()];
+        // Clocked outputs have been written to the worker's row.
+        let mut row = self.worker.row.clone();
         instance.get(outputs, &mut row)?;
         if !is_after {
-            let (states, states_changed) = (Vec::new(), false);
-            let event =
-                Occurrence { run: self.run, time, before: row, after: Vec::new(), states, states_changed };
-            self.event = Some(event);
+            self.event = Some(Occurrence { run: self.run, time, before: row, ..Occurrence::default() });
         } else if let Some(event) = self.event.take() {
             self.worker.events.push(Occurrence { after: row, ..event });
         }
@@ -135,5 +146,58 @@ impl Hooks for Observed<'_, '_> {
 
     fn set_exact(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection> {
         self.worker.plan.exact_inputs.iter().try_for_each(|input| input.set(instance, self.run, index))
+    }
+}
+
+/// A run in Model Exchange with clocks, which tick whenever the discrete states are updated.
+struct Ticked<'t, 'w, 'a> {
+    observed: Observed<'w, 'a>,
+    ticking: &'t mut Ticking<'a>,
+    /// Whether the initial event has begun.
+    has_begun: bool,
+}
+
+impl Hooks for Ticked<'_, '_, '_> {
+    fn record(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection> {
+        self.ticking.show(self.observed.times[index], &mut self.observed.worker.row);
+        self.observed.record(instance, index)
+    }
+
+    fn proceed(&mut self, time: f64) -> bool {
+        self.observed.proceed(time)
+    }
+
+    fn event(&mut self, instance: &mut SystemInstance, time: f64, is_after: bool) -> Result<(), Rejection> {
+        self.ticking.show(time, &mut self.observed.worker.row);
+        self.observed.event(instance, time, is_after)
+    }
+
+    fn updated(&mut self, instance: &mut SystemInstance, x: &[f64], reported: bool) -> Result<(), Rejection> {
+        self.observed.updated(instance, x, reported)
+    }
+
+    /// The initial event is only among the results if a clock ticks in it.
+    fn update(&mut self, instance: &mut SystemInstance, time: f64) -> Result<Event, Rejection> {
+        let is_initial = !std::mem::replace(&mut self.has_begun, true);
+        let is_kept = is_initial && self.ticking.is_due(time);
+        if is_kept {
+            self.event(instance, time, false)?;
+        }
+        let event = self.ticking.update(instance, time)?;
+        if let Some(occurrence) = &mut self.observed.event {
+            occurrence.clocks.extend(self.ticking.names());
+        }
+        if is_kept {
+            self.event(instance, time, true)?;
+        }
+        Ok(event)
+    }
+
+    fn changes(&self, index: usize) -> bool {
+        self.observed.changes(index)
+    }
+
+    fn set_exact(&mut self, instance: &mut SystemInstance, index: usize) -> Result<(), Rejection> {
+        self.observed.set_exact(instance, index)
     }
 }

@@ -1,5 +1,6 @@
 //! Checks a batch and looks up its variables.
 
+use super::event_plan::EventPlan;
 use super::exact::Input;
 use super::inputs::{Inputs, checked, each_input, is_held, once};
 use super::model_exchange_plan::ModelExchangePlan;
@@ -36,6 +37,8 @@ pub(super) struct Plan<'a> {
     pub interface: Interface,
     /// Size of each step in Co-Simulation, s, if an FMU needs steps of equal size.
     pub step: Option<f64>,
+    /// Clocks, and settings of events in Co-Simulation; `None` if there are none.
+    pub events: Option<Box<EventPlan<'a>>>,
     /// Inputs and settings of Model Exchange; `None` in Co-Simulation.
     pub model_exchange: Option<ModelExchangePlan<'a>>,
 }
@@ -64,12 +67,21 @@ impl<'a> Plan<'a> {
             tolerance: batch.tolerance,
             interface,
             step: None,
+            events: EventPlan::of(system, batch, interface)?.map(Box::new),
             model_exchange: None,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
         }
         for name in &batch.outputs {
+            if let (Some(events), Some(found)) = (&mut plan.events, system.find_clocked(name)) {
+                let row = plan.outputs.len();
+                events.add_output(name, found, row, batch)?;
+                plan.columns.push(Column::Number(row));
+                // The clocks write the values of this output.
+                plan.outputs.push(name, &[]);
+                continue;
+            }
             let found = system.find(name)?;
             let base = found[0].variable.base;
             if is_exact(base) {
@@ -82,7 +94,7 @@ impl<'a> Plan<'a> {
         }
         match interface {
             Interface::CoSimulation => {
-                check_of_co_simulation(batch)?;
+                check_of_co_simulation(batch, plan.events.is_some())?;
                 if let Some(model) = system.fixed_step() {
                     check_equal_steps(model, time)?;
                     plan.step = Some((time[time.len() - 1] - time[0]) / (time.len() - 1) as f64);
@@ -102,10 +114,14 @@ impl<'a> Plan<'a> {
     }
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
-        let inputs = &mut self.inputs;
+        let (inputs, mut events) = (&mut self.inputs, self.events.as_mut());
         each_input(system, batch, &mut self.exact_inputs, |name, trajectory, variables| {
             let of = variables[0].variable;
             let base = (of.base, variables[0].description.standard);
+            let inputs = match &mut events {
+                Some(events) if is_held(of) => &mut events.held,
+                _ => &mut *inputs,
+            };
             inputs.values.push(checked(name, base, trajectory, is_held(of), batch.time)?);
             inputs.variables.push(name, &variables);
             Ok(())
@@ -122,11 +138,15 @@ impl<'a> Plan<'a> {
 }
 
 /// Fails if settings for Model Exchange are given in Co-Simulation.
-fn check_of_co_simulation(batch: &Batch) -> Result<(), Error> {
-    if batch.events || batch.integration != Integration::default() {
+fn check_of_co_simulation(batch: &Batch, handles_events: bool) -> Result<(), Error> {
+    if batch.integration != Integration::default() {
         return request(
-            "solver, rtol, atol, max_step and events are for Model Exchange; in Co-Simulation the FMU has its own solver, see tolerance"
-                .to_owned(),
+            "solver, rtol, atol and max_step are for Model Exchange; in Co-Simulation the FMU has its own solver, see tolerance".to_owned(),
+        );
+    }
+    if batch.events && !handles_events {
+        return request(
+            "events are for Model Exchange, and in Co-Simulation for a single FMU that has event mode (hasEventMode of FMI 3.0)".to_owned(),
         );
     }
     Ok(())

@@ -42,7 +42,7 @@ pub(super) struct Worker<'a> {
     pulse: Pulse,
     /// The instance of the previous run, if instances are reused.
     used: Option<SystemInstance>,
-    inputs: InputRows<'a>,
+    pub inputs: InputRows<'a>,
     derivatives: InputRows<'a>,
     /// Index of the current run.
     number: usize,
@@ -116,9 +116,9 @@ impl<'a> Worker<'a> {
     }
 
     /// Returns whether a run may reset the instance of an earlier one. With logging on, it may not, so that the messages of each run are
-    /// complete.
+    /// complete. An instance with event mode is not kept, because later runs may be without.
     fn may_reuse(&self) -> bool {
-        self.plan.reuse && !self.logging().on
+        self.plan.reuse && !self.logging().on && self.plan.events.is_none()
     }
 
     /// Takes an instance that an earlier batch has kept, if there is one.
@@ -148,8 +148,8 @@ impl<'a> Worker<'a> {
     ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
         self.report_time(run, plan.time[0]);
-        let instance =
-            SystemInstance::renewed(self.used.take(), self.system, plan.interface, &self.logging());
+        let mode = (plan.interface, plan.events.is_some());
+        let instance = SystemInstance::renewed(self.used.take(), self.system, mode, &self.logging());
         let mut instance = instance.map_err(|(text, is_silent)| Failure { at: None, text, is_silent })?;
         instance.forget_log();
         self.inputs.begin(&plan.inputs, run);
@@ -157,9 +157,10 @@ impl<'a> Worker<'a> {
         (self.reached, self.number) = (0, run);
         self.exact_of_run.clear();
         self.measured.begin();
-        let stopped: Option<Stopped> = match &plan.model_exchange {
-            None => self.follow(times, &mut instance, run, trajectories).err(),
-            Some(model_exchange) => {
+        let stopped: Option<Stopped> = match (&plan.model_exchange, &plan.events) {
+            (None, None) => self.follow(times, &mut instance, run, trajectories).err(),
+            (None, Some(events)) => self.follow_events(events, times, &mut instance, run, trajectories).err(),
+            (Some(model_exchange), _) => {
                 self.integrate(model_exchange, times, &mut instance, run, trajectories).err()
             }
         };
@@ -334,7 +335,7 @@ impl<'a> Worker<'a> {
     }
 
     #[inline(always)]
-    fn set_values(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
+    pub fn set_values(&mut self, instance: &mut SystemInstance, time: usize) -> Result<(), Rejection> {
         for input in &self.plan.exact_inputs {
             input.set(instance, self.number, time)?;
         }

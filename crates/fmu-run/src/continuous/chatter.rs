@@ -2,14 +2,14 @@
 
 /// Counts the events within a short time.
 #[derive(Debug)]
-pub(super) struct Chatter {
+pub(crate) struct Chatter {
     /// Time from which on events are counted, s: the start time of the run, or the time of the first counted event.
     since: f64,
     count: usize,
 }
 
 /// Number of events within a short time at which the run fails, because the model chatters.
-pub(super) const MOST_EVENTS: usize = 1000;
+pub(crate) const MOST_EVENTS: usize = 1000;
 /// Length of a short time, relative to the magnitude of the times of the run.
 const SHORT: f64 = 1e-9;
 

@@ -11,6 +11,7 @@ mod simulation;
 mod solve;
 mod stepping;
 
+pub(crate) use chatter::{Chatter, MOST_EVENTS};
 pub(crate) use inputs::{Curve, Signals, Slopes};
 pub(crate) use model::Model;
 pub(crate) use simulation::{Hooks, Simulation};

@@ -6,7 +6,7 @@ use super::inputs::Break;
 use super::model::Model;
 use super::{Integration, Solver};
 use crate::system_instance::SystemInstance;
-use fmi_abi::client::Rejection;
+use fmi_abi::client::{Event, Rejection};
 use fmi_abi::shown_number;
 
 /// Functions of the caller that are called during a run.
@@ -24,6 +24,11 @@ pub(crate) trait Hooks {
     /// Called in an event after the FMU has updated its discrete states, before the states are read. `x` are the states before, and
     /// `reported` is whether the FMU reports that they have changed.
     fn updated(&mut self, instance: &mut SystemInstance, x: &[f64], reported: bool) -> Result<(), Rejection>;
+
+    /// Updates the discrete states in Event Mode at this time, s, until the event is complete.
+    fn update(&mut self, instance: &mut SystemInstance, _time: f64) -> Result<Event, Rejection> {
+        instance.sole().event()
+    }
 
     /// Returns whether a string, bytes or a 64-bit integer among the inputs changes at this communication point.
     fn changes(&self, index: usize) -> bool;
@@ -249,7 +254,7 @@ impl<'a> Simulation<'a> {
         is_first: bool,
     ) -> Result<bool, Rejection> {
         let mut parts = model.parts();
-        let event = parts.instance.sole().event()?;
+        let event = hooks.update(parts.instance, self.time)?;
         if event.terminate {
             drop(parts);
             return Err(self.ended(model));

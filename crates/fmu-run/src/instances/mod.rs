@@ -123,6 +123,7 @@ impl System {
         feed: Option<Arc<Feed>>,
     ) -> Result<Instances, Error> {
         self.check_interface(setup.interface)?;
+        self.check_unclocked()?;
         if setup.count == 0 {
             return request("count must be at least 1".to_owned());
         }
@@ -228,7 +229,7 @@ impl Instances {
             one.progress = Progress { time: begin.experiment.start_time, ..Progress::default() };
             let feed = feed.as_ref().map(|feed| (Arc::clone(feed), index));
             let logging = Logging { on: feed.is_some(), feed };
-            match SystemInstance::renewed(one.instance.take(), system, interface, &logging) {
+            match SystemInstance::renewed(one.instance.take(), system, (interface, false), &logging) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, begin, index, interface) {

@@ -197,7 +197,13 @@ impl System {
         if self.array(name).is_some() {
             return Ok(None);
         }
-        Ok(Some(self.find_first(name)?.variable.base).filter(|base| is_exact(*base)))
+        Ok(Some(self.find_any(name)?.variable.base).filter(|base| is_exact(*base)))
+    }
+
+    /// Returns whether a variable of a single FMU has a value only while a clock is active. Runs can set it as an input and read it as an
+    /// output.
+    pub fn is_clocked(&self, name: &str) -> bool {
+        self.find_clocked(name).is_some()
     }
 
     /// Returns the conversion between the unit of a variable and another unit, as factor and offset: value in
@@ -206,7 +212,7 @@ impl System {
     /// # Errors
     /// Returns [`Error::Request`] if the variable is unknown or has no unit, or if its FMU does not define the conversion.
     pub fn display_unit(&self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
-        self.find_first(name)?.display_unit(name, unit)
+        self.find_any(name)?.display_unit(name, unit)
     }
 
     /// Frees the instances and the threads that earlier [runs](Self::run) have kept for later ones. They are also freed with the last
@@ -247,7 +253,7 @@ impl System {
             .map(|component| &*component.fmu)
     }
 
-    /// Fails if a component does not support this interface type or needs clocks, or if a system is to run in Model Exchange.
+    /// Fails if a component does not support this interface type, or if a system is to run in Model Exchange.
     pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
         if interface == Interface::ModelExchange && self.sole().is_none() {
             return Err(Error::Fmu(format!(
@@ -255,13 +261,7 @@ impl System {
                 self.name()
             )));
         }
-        for Component { name, fmu } in self.components() {
-            if let Some(clock) = fmu.description.unsupported_clock() {
-                return Err(Error::Fmu(format!(
-                    "{} is an input clock that must tick at its own times, and clocks are not supported here, so it would never tick",
-                    joined(name, clock)
-                )));
-            }
+        for Component { fmu, .. } in self.components() {
             // States and event indicators would be missing. In Co-Simulation their number does not matter.
             let mut faults = fmu.description.faults.iter();
             if interface == Interface::ModelExchange
@@ -272,6 +272,31 @@ impl System {
             fmu.library(interface)?;
         }
         Ok(())
+    }
+
+    /// Fails if a component has a clock that must tick, for callers that do not tick clocks.
+    pub(crate) fn check_unclocked(&self) -> Result<(), Error> {
+        let mut needed = self
+            .components()
+            .iter()
+            .filter_map(|Component { name, fmu }| Some(joined(name, fmu.description.needed_clock()?)));
+        needed.next().map_or(Ok(()), |clock| {
+            Err(Error::Fmu(format!(
+                "{clock} is an input clock that must tick at its own times, but only the function run, for a single FMU, ticks clocks"
+            )))
+        })
+    }
+
+    /// Returns the clocked variable of a single FMU with this name, if there is one. Only runs can set and read it.
+    pub(crate) fn find_clocked(&self, name: &str) -> Option<Found<'_>> {
+        let description = &self.sole()?.description;
+        let variable = description.clocked(name)?;
+        Some(Found { component: 0, variable, description, source: None, connector: None })
+    }
+
+    /// Returns the first variable with this name, which may be clocked.
+    fn find_any(&self, name: &str) -> Result<Found<'_>, Error> {
+        self.find_clocked(name).map_or_else(|| self.find_first(name), Ok)
     }
 
     /// Returns the interface type of runs: the requested one, or Co-Simulation by default. For a single FMU that has only Model

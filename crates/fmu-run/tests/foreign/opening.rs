@@ -3,7 +3,7 @@
 use crate::built::built;
 use crate::end;
 use fmi_abi::write::zip;
-use fmu_run::{Batch, Error, Fmu, Order, Setup, Standard, System, Watch};
+use fmu_run::{Batch, Composition, Error, Fmu, Order, Setup, Standard, System, Trajectory, Watch};
 use std::path::Path;
 
 fn opened(path: &Path) -> Result<System, String> {
@@ -168,22 +168,47 @@ fn clocks_are_named() {
     let fmu = opened(&path).unwrap();
     assert_eq!(end(&fmu), Ok(1.0));
     let why = fmu.select(&["tick"]).unwrap_err().to_string();
-    assert!(why.starts_with("tick is a clock, and clocks are not supported here"), "{why}");
+    assert!(
+        why.starts_with("tick is a clock; only the function run, for a single FMU, ticks clocks"),
+        "{why}"
+    );
     let why = fmu.select(&["ticks"]).unwrap_err().to_string();
     assert!(why.starts_with("ticks has a value only while its clock ticks"), "{why}");
     // The importer need not activate a triggered clock, but without ticks at its own times another clock has no effect.
     let run = |path: &Path| {
         // SAFETY: the FMU of this test.
         let fmu = unsafe { Fmu::open(path) }.unwrap();
-        let batch = Batch { time: &[0.0, 1.0], outputs: vec!["y"], ..Batch::default() };
+        let run = |system: &System, output| {
+            let batch = Batch { time: &[0.0, 1.0], outputs: vec![output], ..Batch::default() };
+            system.run(&batch, &Watch::default()).map(drop)
+        };
+        let composition = Composition { components: vec![("a", &fmu)], ..Composition::default() };
+        let connected = System::connect(&composition).unwrap();
         let made = fmu.system().instances(&Setup::default()).map(drop);
-        (fmu.system().run(&batch, &Watch::default()).map(drop), made)
+        [run(fmu.system(), "y"), run(&connected, "a.y"), made]
     };
-    assert_eq!(run(&path), (Ok(()), Ok(())));
+    assert_eq!(run(&path), [Ok(()), Ok(()), Ok(())]);
+    // Nor is its input set, so that the caller is told.
+    let input = clock.replace("\"output\" variability", "\"input\" start=\"0\" variability");
+    let path = built("plain", Standard::Fmi3, directory.path(), &[("<ModelVariables>", &input)]);
+    // SAFETY: the FMU of this test.
+    let fmu = unsafe { Fmu::open(&path) }.unwrap();
+    let inputs = vec![("ticks", Trajectory::Constant(1.0))];
+    let batch = Batch { time: &[0.0, 1.0], outputs: vec!["y"], inputs, ..Batch::default() };
+    let why = fmu.system().run(&batch, &Watch::default()).unwrap_err().to_string();
+    assert!(why.starts_with("tick is a clock, but in Co-Simulation "), "{why}");
     let periodic = clock.replace("\"triggered\"", "\"constant\" intervalDecimal=\"0.1\"");
     let path = built("plain", Standard::Fmi3, directory.path(), &[("<ModelVariables>", &periodic)]);
-    let why = Err(Error::Fmu(
-        "tick is an input clock that must tick at its own times, and clocks are not supported here, so it would never tick".to_owned(),
-    ));
-    assert_eq!(run(&path), (why.clone(), why));
+    let why = |name| {
+        let what = "is an input clock that must tick at its own times, but only the function run, for a single FMU, ticks clocks";
+        Err(Error::Fmu(format!("{name} {what}")))
+    };
+    let [alone, connected, made] = run(&path);
+    assert_eq!((connected, made), (why("a.tick"), why("tick")));
+    // The description of this FMU has no hasEventMode.
+    let alone = alone.unwrap_err().to_string();
+    assert!(
+        alone.starts_with("tick is a clock, but in Co-Simulation ") && alone.ends_with("which clocks need"),
+        "{alone}"
+    );
 }
