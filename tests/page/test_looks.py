@@ -69,6 +69,20 @@ def test_number_machine_and_plot_fit_on_a_phone(visit: Any) -> None:
         assert -1 < scene["y"] < scene["bottom"] < plot["y"] < plot["bottom"] < dial["y"] < dial["bottom"] < 740, number
 
 
+def test_plots_next_to_each_other(visit: Any) -> None:
+    """If a step has one plot more, the others are drawn again for their new width, so that no label is squeezed. All have their axes at one
+    height."""
+    page = visit(viewport={"width": 1440, "height": 900}, reduced_motion="reduce")
+    for number in range(7):
+        page.locator(".live-steps button").nth(number).click()
+        page.wait_for_timeout(300)
+        sizes = page.locator(".live-plots figure:visible canvas").evaluate_all(
+            "all => all.map(e => [e.width - e.clientWidth, e.getBoundingClientRect().bottom])"
+        )
+        assert len(sizes) == (4 if number == 4 else 3)
+        assert all(abs(wider) <= 1 and bottom == sizes[0][1] for wider, bottom in sizes), (number, sizes)
+
+
 def test_without_scripts_and_on_paper(visit: Any) -> None:
     """Without scripts the page has no gap. On paper it has no controls, and long lines of code wrap."""
     page = visit(java_script_enabled=False)

@@ -46,7 +46,9 @@ class Player {
     this.bar = element("div", { class: "live-bar" }, this.play, this.slider, this.clock, this.pace, this.late);
     this.stage = element("div", { class: "live-stage" }, ...(options.view ? [options.view.element] : []), this.bar);
     this.element = element("div", { class: "live-player" }, this.stage, this.plots.element);
-    new ResizeObserver(() => this.requestFrame()).observe(this.element);
+    // A panel that appears changes the width of the others, but not of the player.
+    const resized = new ResizeObserver(() => this.requestFrame());
+    [this.element, ...this.plots.panels.map(({ canvas }) => canvas)].forEach((one) => resized.observe(one));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.requestFrame());
     new IntersectionObserver((entries) => {
       this.isVisible = entries[entries.length - 1].isIntersecting;

@@ -140,7 +140,7 @@ const WHY_BOTH = [
 
 /** @type {Part[]} */
 const WHAT_COUPLING = [
-  "Between a motor and its disc are two couplings: springs, each with a damper next to it. Both motors make a fast move of 20\u00b0, and the coupling next to the wrist twists. It pushes with two torques: the spring\u2019s is its stiffness times the twist, the damper\u2019s follows the rate of the twist. k\u2082\u00a0= ", SPRING, ".",
+  "Between a motor and its disc are two couplings: springs, each with a damper next to it. Both motors make a fast move of 20\u00b0, and the coupling next to the wrist twists. It pushes with two torques: the spring\u2019s is its stiffness times the twist, the damper\u2019s follows the rate of the twist. k\u2082\u00a0=\u00a0", SPRING, ".",
 ];
 /** @type {Part[]} */
 const WHY_COUPLING = [
@@ -189,7 +189,7 @@ const WHAT_SHAKE = [
     const far = `The wrist swings ${gain.toFixed(2)} times as far as the motors. `;
     return peaks.now[1] >= 1.02 && Math.abs(value("frequency") - peaks.now[0]) < BAND[2] / 2 ? `${far}This is the peak: the resonance. ` : far;
   },
-  "Search the frequency at which it swings farthest, here or by clicks in the plot. Then change the stiffness of the couplings next to the wrist: k\u2082\u00a0= ", SOFTNESS, ".",
+  "Search the frequency at which it swings farthest, here or by clicks in the plot. Then change the stiffness of the couplings next to the wrist: k\u2082\u00a0=\u00a0", SOFTNESS, ".",
 ];
 /** @type {Part[]} */
 const WHY_SHAKE = [
@@ -237,7 +237,7 @@ const WHAT_STOP = [
     const parts = `Then they make the same move in two parts, ${first} and, half a swing later, ${second}`;
     return `${move} ${parts}. `;
   },
-  "Change the stiffness: k\u2082\u00a0= ", GIVE, ". ",
+  "Change the stiffness: k\u2082\u00a0=\u00a0", GIVE, ". ",
   (facts) => (["J2", "H3", "k1", "k2", "c1", "c2", "c3"].every((name) => isPreset(facts, name)) ? "The parts fit this stiffness." : "The parts stay those for the FMU\u2019s own values."),
 ];
 /** @type {Part[]} */

@@ -127,7 +127,7 @@ class Resonance {
     const find = (/** @type {string} */ name) => /** @type {Variable} */ (own.description.byName.get(name));
     this.motors = this.fmu.group(MOTORS.map(find));
     this.pitch = this.fmu.group([find("pitch")]);
-    this.plots = new Plots([{ title: "Swing, relative to the motors", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
+    this.plots = new Plots([{ title: "Swing: wrist / motors", unit: "", isNoted: true, curves: [{ name: "gain", label: "at this frequency", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
     this.element = this.plots.element;
     this.key = "";
     /** Responses with the parameters as the page opens, and with the current parameters. @type {(Table | undefined)[]} */

@@ -648,10 +648,10 @@ class Wrist {
         label(`the redder, the more torque: motor 1 ${torques[0]}, motor 2 ${torques[1]} N\u00b7m`, [8, 20], "soft", "left");
       }
       if (isOn("carriers")) {
-        SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 1.5, 0.24, 0]), `text-${index + 1}`, "center"));
+        SHAFTS.forEach(({ side }, index) => label(`rollers of motor ${index + 1}`, this.project([side * 1.4, 1.15, 0]), `text-${index + 1}`, "center"));
       }
       if (isOn("cam")) {
-        label("cam of the gripper", this.project([0.62, 1.05, 0]), "text-4", "left");
+        label("cam of the gripper", this.project([0.35, 1.65, 0]), "text-4", "left");
       }
     } else {
       if (isOn("motors")) {
