@@ -115,11 +115,3 @@ def test_the_experiments_of_fig4_run_without_an_operating_system(sources: Path, 
     stated = dict(re.findall(r"^\| (.*) \| ([\d,]+) \|$", PAGE.read_text(encoding="utf-8"), re.M))
     for name, value in table.items():
         assert value == pytest.approx(int(stated[name].replace(",", "")), rel=0.1), name
-
-
-@pytest.mark.small
-def test_the_page_shows_the_program() -> None:
-    """The page shows parts of startup.c as they are there."""
-    blocks = re.findall(r"^```c\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
-    program = (HERE / "startup.c").read_text(encoding="utf-8")
-    assert blocks and all(block in program for block in blocks)
