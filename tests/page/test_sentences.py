@@ -55,7 +55,8 @@ def page(browser: Browser, fmu: Path, tmp_path_factory: pytest.TempPathFactory) 
     # The content security policy allows only the page's own scripts.
     html = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", SCRIPT.sub(lambda _: f"\n{script}", html))
     path.write_text(html, encoding="utf-8")
-    page = browser.new_page(viewport={"width": 1000, "height": 900}, reduced_motion="reduce")
+    # The image is drawn for each run, which takes long if it is large.
+    page = browser.new_page(viewport={"width": 660, "height": 240}, reduced_motion="reduce")
     page.goto(address)
     page.locator(".live-clock").wait_for()
     yield page
