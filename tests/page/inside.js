@@ -81,6 +81,9 @@
     button("Link to this").click();
     await wait(50);
     report.link = location.hash;
+    const scene = find(".live-scene");
+    const colours = new Uint32Array(scene.getContext("2d").getImageData(0, 0, scene.width, scene.height).data.buffer);
+    report.painted = colours.filter((colour) => colour).length / colours.length;
     report.wide = document.documentElement.scrollWidth > innerWidth;
     report.guid = find(".live code").textContent;
     report.requests = performance.getEntriesByType("resource").length;

@@ -240,9 +240,15 @@ class Plots {
     const x = (/** @type {number} */ time) => area.left + ((time - begin) / (end - begin)) * (area.right - area.left);
     const y = (/** @type {number} */ value) => area.bottom - ((value - low) / (high - low)) * (area.bottom - area.top);
     this.drawGrid(pen, area, marks.map(({ value, text }) => ({ text, at: y(value) })), ticks(begin, end, Math.min(8, width / 60)).map(({ value, text }) => ({ text, at: x(value) })), isLast);
+    let noted = 0;
     const say = (/** @type {string} */ text, /** @type {number} */ left) => {
       const half = pen.measureText(text).width / 2 + 2;
       const middle = Math.max(area.left + half, Math.min(area.right - half, left));
+      // In a narrow plot, a note that would cover the one before is left out.
+      if (middle - half < noted) {
+        return;
+      }
+      noted = middle + half;
       pen.textAlign = "center";
       pen.textBaseline = "alphabetic";
       pen.lineWidth = 3;

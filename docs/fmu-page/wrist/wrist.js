@@ -681,10 +681,11 @@ class Wrist {
 
 /** Draws bodies with a depth buffer on a separate canvas. */
 class Shaded {
-  /** Returns `null` if the browser has no WebGL, or only in software. @returns {Shaded | null} */
+  /** Returns `null` if the browser has no WebGL, or only in software, or rejects the shaders. @returns {Shaded | null} */
   static make() {
     const gl = element("canvas").getContext("webgl", { antialias: true, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: true });
-    return gl && new Shaded(gl);
+    const made = gl && new Shaded(gl);
+    return made?.isLinked ? made : null;
   }
 
   /** @param {WebGLRenderingContext} gl */
@@ -700,6 +701,7 @@ class Shaded {
       gl.attachShader(program, shader);
     }
     gl.linkProgram(program);
+    this.isLinked = Boolean(gl.getProgramParameter(program, gl.LINK_STATUS));
     gl.useProgram(program);
     gl.enable(gl.DEPTH_TEST);
     const locations = ["camera", "turn", "scale", "centre", "lamp", "warm"].map((name) => [name, gl.getUniformLocation(program, name)]);
@@ -816,7 +818,6 @@ void main() {
 }`;
 const PIXELS = `
 precision mediump float;
-uniform mat3 camera;
 uniform vec3 lamp;
 uniform vec4 warm;
 varying vec3 own, face;
