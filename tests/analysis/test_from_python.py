@@ -104,28 +104,32 @@ def test_wrong_arguments(recording, fmu, options, message):
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory):
-    """A recording of 2 s, for fits that do not explain the data, because their causes are looked for."""
-    path = tmp_path_factory.mktemp("short") / "run.csv"
-    rig.write(path, rig.measure(rig.experiment(1, 2), 5, ("tau1", "theta3", "theta4")))
-    return path
+def undamped():
+    """A rig whose output has no damping, and a recording of it."""
+    simulated = rig.experiment(1, 2)
+    parameters = {**simulated.parameters, "c3": 0.0}
+    frequency, waves = np.array([0.7, 2.1, 6.3]), np.array([[1, 0.6j, 0.3], [0.8j, -0.5, 0.2j]])
+    return parameters, rig.measure(rig.respond(parameters, simulated.time, frequency, waves), 5, ("tau1", "tau2"))
 
 
-def test_a_parameter_that_is_0(short, fmu):
+def test_a_parameter_that_is_0(undamped, recording, experiment, fmu):
     """A parameter that is 0 can be fixed. If it is estimated, the search starts at a prior's value or between the bounds, not at 0."""
-    found = prw.identify(short, estimate="k1", parameters={"c3": 0}, starts=1, fmu=fmu)
-    assert found.values["c3"] == 0 and list(found.parameters) == ["k1"]
-    expected = prw.identify(short, estimate="c3", starts=1, fmu=fmu)
-    zero = {"parameters": {"c3": 0}, "starts": 1, "fmu": fmu}
+    parameters, columns = undamped
+    fixed = {name: parameters[name] for name in ("k2", "c1", "c2", "c3")}
+    found = prw.identify(columns, estimate="k1", parameters=fixed, starts=1, fmu=fmu)
+    assert found.fits and found.values["c3"] == 0 and list(found.parameters) == ["k1"]
+    assert abs(found.values["k1"] - parameters["k1"]) < 4.5 * found.parameters["k1"].standard_error
+    # All other parameters are known, so that the data fit, and no causes are looked for.
+    known = {name: experiment.parameters[name] for name in ("k1", "k2", "c1", "c2")}
     start = table_1()["c3"]
-    from_bounds = prw.identify(short, estimate="c3", bounds={"c3": (start / 10, start * 20)}, **zero)
-    prior = {"estimate": "c3", "priors": {"c3": (start, 1)}}
-    with_prior, from_prior = (
-        prw.identify(short, **prior, starts=1, fmu=fmu),
-        prw.identify(short, **prior, **zero),
-    )
-    assert from_bounds.values["c3"] == pytest.approx(expected.values["c3"], rel=1e-6)
-    assert from_prior.values["c3"] == pytest.approx(with_prior.values["c3"], rel=1e-6)
+
+    def estimated(c3: float, **options) -> float:
+        with_start = {"parameters": {**known, "c3": c3}, "starts": 1, "fmu": fmu}
+        return prw.identify(recording, estimate="c3", **with_start, **options).values["c3"]
+
+    expected, prior = estimated(start), {"priors": {"c3": (start, 1)}}
+    assert estimated(0, bounds={"c3": (start / 10, start * 20)}) == pytest.approx(expected, rel=1e-6)
+    assert estimated(0, **prior) == pytest.approx(estimated(start, **prior), rel=1e-6)
 
 
 def test_sources_that_are_not_recordings():
@@ -138,13 +142,14 @@ def test_sources_that_are_not_recordings():
             prw.identify(files)
 
 
-def test_columns_in_memory_and_one_name(short, fmu):
+def test_columns_in_memory_and_one_name(recording, experiment, fmu):
     """A dict may replace a file, also in a list, and a name may replace a list of one name."""
-    read = prw.read(short)
+    read = prw.read(recording)
     columns = {name: read[name] for name in read.units}
-    expected = prw.identify(short, estimate=["k1"], starts=1, fmu=fmu).values
+    known = {"parameters": {name: experiment.parameters[name] for name in ("k2", "c1", "c2", "c3")}, "starts": 1}
+    expected = prw.identify(recording, estimate=["k1"], **known, fmu=fmu).values
     for files in (columns, [columns]):
-        assert prw.identify(files, estimate="k1", starts=1, fmu=fmu).values == expected
+        assert prw.identify(files, estimate="k1", **known, fmu=fmu).values == expected
 
 
 def test_excite(fmu):

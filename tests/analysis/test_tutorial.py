@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
-import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -19,18 +21,18 @@ TUTORIAL = ROOT / "python" / "prw" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
-def test_the_commands_work_as_on_the_page(tmp_path, fmu):
+@pytest.mark.filterwarnings("ignore:tau. may be off")
+def test_the_commands_work_as_on_the_page(prw, tmp_path, fmu, monkeypatch):
     if not shutil.which("cargo"):
         pytest.skip("no cargo")
     (tmp_path / "target" / "fmu").mkdir(parents=True)
     shutil.copy(fmu, tmp_path / "target" / "fmu")
     shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=shutil.ignore_patterns("*-fmu"))
-    directories = [str(Path(sys.executable).parent), os.environ["PATH"]]
-    environment = {**os.environ, "PATH": os.pathsep.join(directories)}
+    monkeypatch.setenv("PRW_FMU", str(fmu))
     reported, is_built = "", False
     for language, block in BLOCK.findall(TUTORIAL.read_text(encoding="utf-8")):
         if language == "python":
-            reported += run([sys.executable, "-c", block], tmp_path, environment)
+            exec(compile(block, str(TUTORIAL), "exec"), {})
             continue
         for line in block.strip().splitlines():
             if line.startswith("make "):
@@ -41,15 +43,19 @@ def test_the_commands_work_as_on_the_page(tmp_path, fmu):
                 assert line.startswith("cargo run --release --bin build_fmu -- ")
                 command = [*program("build_fmu"), *command[command.index("--") + 1 :], "--describe"]
                 command = [str(tmp_path / w) if w.startswith("out/") or w == "mine" else w for w in command]
-                reported += run(command, ROOT, environment)
+                result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
                 is_built = True
-            elif "--fmu" in command:
-                command[command.index("--fmu") + 1] = "target/fmu/prw_testbed.fmu"
-                reported += run([sys.executable, "-m", *command], tmp_path, environment)
+            elif command[0] == "python":
+                result = run_script(command[1:], monkeypatch)
             else:
-                assert not is_built, f"{line}: does not use the FMU with the identified parameters"
-                start = [sys.executable] if command[0] == "python" else [sys.executable, "-m", "prw"]
-                reported += run([*start, *command[1:]], tmp_path, environment)
+                assert command[0] == "prw"
+                if "--fmu" in command:
+                    command[command.index("--fmu") + 1] = "target/fmu/prw_testbed.fmu"
+                else:
+                    assert not is_built, f"{line}: does not use the FMU with the identified parameters"
+                result = prw(*command[1:], with_fmu=False)
+            assert result.returncode == 0, f"{line}\n{result.stdout}{result.stderr}"
+            reported += result.stdout
     rigs = re.findall(r"true parameters of the rig: (.*)", reported)
     for truth, directory in zip(rigs, ("identified", "friction"), strict=True):
         rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", truth))
@@ -80,7 +86,10 @@ def starts_of(description: Path) -> dict[str, float]:
     return {v.get("name"): float(v[0].get("start")) for v in numbers}
 
 
-def run(command, directory, environment) -> str:
-    result = subprocess.run(command, cwd=directory, env=environment, capture_output=True, text=True, timeout=600)
-    assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
-    return result.stdout
+def run_script(command: list[str], monkeypatch) -> subprocess.CompletedProcess[str]:
+    """Runs a Python script in this process, in which the packages are imported already."""
+    out = io.StringIO()
+    with monkeypatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.setattr(sys, "argv", command)
+        runpy.run_path(command[0], run_name="__main__")
+    return subprocess.CompletedProcess(command, 0, out.getvalue(), "")

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -140,14 +140,26 @@ class Task:
         return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.unknowns])
 
 
+@lru_cache(maxsize=16)
 def polynomials(count: int) -> Array:
-    """Legendre polynomials (count, DRIFT) of the degrees from 1 at `count` points from -1 to 1."""
-    return np.asarray(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), DRIFT)[:, 1:], dtype=np.float64)
+    """Legendre polynomials (count, DRIFT) of the degrees from 1 at `count` points from -1 to 1. Read-only, because every comparison uses
+    the same ones."""
+    found = np.asarray(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), DRIFT)[:, 1:], dtype=np.float64)
+    found.flags.writeable = False
+    return found
+
+
+@lru_cache(maxsize=16)
+def _slow_spectra(count: int) -> Complex:
+    """Spectra (count // 2 + 1, DRIFT) of `polynomials`, read-only as these."""
+    found = spectra(polynomials(count))
+    found.flags.writeable = False
+    return found
 
 
 def slow(experiment: Experiment, channels: Sequence[str]) -> Complex:
     """Spectra (needed_bins, c, q) of `polynomials` over time in each of the channels."""
-    shapes = spectra(polynomials(len(experiment.time)))[: experiment.needed_bins]
+    shapes = _slow_spectra(len(experiment.time))[: experiment.needed_bins]
     found = np.zeros((experiment.needed_bins, len(experiment.channels), 0), dtype=complex)
     for i, name in enumerate(experiment.channels):
         if name in channels:
