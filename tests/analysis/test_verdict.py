@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import plant
 import pytest
@@ -9,6 +11,9 @@ import rig
 from monte_carlo import with_fault
 
 import prw
+from prw.identification.diagnosis import INERTIAS, sums_of_inertias
+from prw.identification.kinds import KINDS
+from prw.identification.verdict import hypotheses
 
 
 def recording(simulated, channels=rig.ALL, **sensors) -> dict[str, np.ndarray]:
@@ -186,12 +191,25 @@ def test_a_decreasing_stiffness_is_estimated_on_request(real_rigs, fmu):
     assert abs(value - 0.04) < 4.5 * error < 0.02
 
 
+def test_the_inertias_that_turn_in_pitch_and_in_roll_are_known_better_than_each_inertia(experiment, fmu):
+    wrong = {name: experiment.parameters[name] / 1.05 for name in ("J2", "J3", "H3")}
+    priors = dict.fromkeys(wrong, 0.1)
+    found = prw.identify(recording(experiment), parameters=wrong, priors=priors, starts=1, fmu=fmu)
+    assert_contains(found, experiment)
+    for each in sums_of_inertias(found.solution):
+        assert abs(each.off - 0.05) < 4.5 * each.error < 0.02
+        assert all(each.error < found.parameters[name].relative / 5 for name in wrong)
+
+
 @pytest.mark.long
 def test_wrong_inertias_are_named_beside_a_gain_of_the_torques(real_rigs, fmu):
     columns = recording(real_rigs["inertia"])
     found = prw.identify(columns, starts=1, fmu=fmu)
     assert not found.fits
     named = " ".join(found.diagnosis)
+    sizes = re.findall(r"(J2 \+ [\d.]+ [JH]3) \+([\d.]+) \+- ([\d.]+) % in (?:pitch|roll)", named)
+    assert [name for name, *_ in sizes] == ["J2 + 0.5 H3", "J2 + 1.531 J3"], named
+    assert all(abs(float(off) - 5) < 4.5 * float(error) < 2 for _, off, error in sizes), named
     assert '`priors={"J2": 0.1, "J3": 0.1, "H3": 0.1}`' in named and '`gain=["tau1", "tau2"]`' in named, named
     assert_contains(
         prw.identify(columns, priors=dict.fromkeys(("J2", "J3", "H3"), 0.1), starts=1, fmu=fmu), real_rigs["inertia"]
@@ -237,6 +255,12 @@ def test_a_channel_that_is_not_explained_is_a_misfit(experiment, fmu):
     found = prw.identify({**columns, "pitch": pitch}, starts=1, fmu=fmu)
     assert [misfit.channel for misfit in found.verdict.misfits] == ["pitch"], found.misfits
     assert "as large as the motion" in found.misfits[0] and "none of these explains the data" in found.summary()
+    # Each hypothesis was either tried or is listed among the others.
+    tried, others = found.explanation.tried, found.explanation.left_out
+    assert "; not tried, because less was expected of them: " in found.summary() and others
+    kinds = (*KINDS, "drift")
+    names = [str(each) for kind in kinds for each in hypotheses(found.solution, kind)] + [str(INERTIAS)]
+    assert sorted([*tried, *others]) == sorted(names)
 
 
 def test_a_turned_inertial_sensor_is_explained(experiment, fmu):

@@ -96,8 +96,8 @@ class Explanation(NamedTuple):
         The fit with the properties of the rig that were found, and its verdict. Without any, the fit and verdict before.
     causes
         Possible causes of the misfit, the most likely first; also those that are in `solution`.
-    tried
-        Names of the hypotheses with which the fit was repeated.
+    tried, left_out
+        Names of the hypotheses with which the fit was repeated, and with which it was not.
     known
         Whether the causes explain the data.
     """
@@ -107,6 +107,7 @@ class Explanation(NamedTuple):
     causes: tuple[Cause, ...]
     tried: tuple[str, ...]
     known: bool = True
+    left_out: tuple[str, ...] = ()
 
     @property
     def unclear(self) -> str:
@@ -136,9 +137,11 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
     chosen: list[_Trial] = []
     rivals: list[_Trial] = []
     tried: dict[str, None] = {}
+    others: dict[str, None] = {}
     for _ in range(MOST):
-        trials = _trials(best.solution, best.verdict)
-        tried.update(dict.fromkeys(str(trial.hypothesis) for trial in trials))
+        trials, fitted, left_out = _trials(best.solution, best.verdict)
+        tried.update(dict.fromkeys(map(str, fitted)))
+        others.update(dict.fromkeys(map(str, left_out)))
         first = chosen[0].gain if chosen else 0.0
         if not trials or trials[0].gain < max(CLEAR**2, SECOND * first):
             break
@@ -166,20 +169,20 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
         # If the first cause explains no channel, further ones would be guesses.
         if best.verdict.fits or len(best.verdict.misfits) >= len(verdict.misfits) > 1:
             break
-    causes = _described(best, chosen, rivals)
+    causes, unlikely = _described(best, chosen, rivals), tuple(name for name in others if name not in tried)
     if not best.verdict.fits or not all(each.hypothesis.belongs for each in [*chosen, *rivals]):
-        return Explanation(solution, verdict, tuple(causes), tuple(tried), best.verdict.fits)
+        return Explanation(solution, verdict, tuple(causes), tuple(tried), best.verdict.fits, unlikely)
     exact = refitted(best.solution, tolerances=FINE)
     judged = judge(exact)
     if not judged.fits:
-        return Explanation(solution, verdict, tuple(causes), tuple(tried))
+        return Explanation(solution, verdict, tuple(causes), tuple(tried), left_out=unlikely)
     # The intervals contain the estimates with every rival.
     count, widening = len(solution.task.names), judged.widening.copy()
     for rival in rivals:
         widening[:count] = np.hypot(
             widening[:count], (rival.solution.logarithms - exact.logarithms[: len(rival.solution.logarithms)])[:count]
         )
-    return Explanation(exact, judged._replace(widening=widening), tuple(causes), tuple(tried))
+    return Explanation(exact, judged._replace(widening=widening), tuple(causes), tuple(tried), left_out=unlikely)
 
 
 class Part(NamedTuple):
@@ -243,8 +246,9 @@ def _all_torques(hypothesis: Hypothesis, solution: Solution) -> bool:
     return hypothesis.kind == "gain" and set(hypothesis.places) == set(TORQUES) & set(solution.fitter.channels)
 
 
-def _trials(solution: Solution, verdict: Verdict) -> list[_Trial]:
-    """Fits with one more hypothesis, in decreasing order of gain."""
+def _trials(solution: Solution, verdict: Verdict) -> tuple[list[_Trial], list[Hypothesis], list[Hypothesis]]:
+    """Fits with one more hypothesis, in decreasing order of gain, without impossible ones; all hypotheses that were tried; and those that
+    were not, because less gain was expected of them."""
     clear: dict[Hypothesis, float] = {}
     for fault in verdict.faults:
         clear[fault.hypothesis] = max(fault.gain, clear.get(fault.hypothesis, 0.0))
@@ -257,11 +261,14 @@ def _trials(solution: Solution, verdict: Verdict) -> list[_Trial]:
         return max(parts, clear.get(Hypothesis(like, hypothesis.places), 0.0)) - 10 * len(hypothesis.places)
 
     ranked: list[tuple[float, Hypothesis]] = []
+    left_out: list[Hypothesis] = []
     for kind in (*KINDS, "drift"):
         each = sorted(((expected_gain(h), h) for h in hypotheses(solution, kind)), key=lambda pair: -pair[0])
         ranked += each[:TRIED]
+        left_out += [hypothesis for _, hypothesis in each[TRIED:]]
     least = max(CLEAR**2 / 2, WORTH_TRYING * max((gain for gain, _ in ranked), default=0.0))
     chosen = [hypothesis for gain, hypothesis in ranked if gain > least]
+    left_out += [hypothesis for gain, hypothesis in ranked if gain <= least]
     measured = set(TORQUES) & set(solution.fitter.channels)
     if (
         measured
@@ -278,7 +285,7 @@ def _trials(solution: Solution, verdict: Verdict) -> list[_Trial]:
             gain = solution.deviance - found.deviance - COST * unknowns
             if not hypothesis.positive or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
                 trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 else verdict))
-    return sorted(trials, key=lambda trial: -trial.gain)
+    return sorted(trials, key=lambda trial: -trial.gain), chosen, left_out
 
 
 def _including(solution: Solution, hypothesis: Hypothesis) -> Solution:
@@ -326,10 +333,12 @@ def _cause(trial: _Trial, solution: Solution, begin: str, then: str) -> Cause:
     kind, places = trial.hypothesis
     task = solution.task
     if trial.hypothesis == INERTIAS:
-        indices, errors = [task.names.index(n) for n in places], _errors(solution)
-        off = [np.exp(solution.logarithms[i]) / task.start[n] - 1 for i, n in zip(indices, places)]
-        # A combination of them may be known better than each.
-        sizes = ", ".join(f"{n} {100 * x:+.1f} +- {100 * errors[i]:.1g} %" for n, x, i in zip(places, off, indices))
+        sums = ", ".join(
+            f"{each.name} {_percent(each.off, each.error)} {each.about}" for each in sums_of_inertias(solution)
+        )
+        errors = dict(zip(task.names, _errors(solution).tolist()))
+        alone = ", ".join(f"{n} {_percent(solution.values[n] / task.start[n] - 1, errors[n])}" for n in places)
+        sizes = f"{sums}; each alone is known less well: {alone}"
         value: Any = dict.fromkeys(places, DRAWING)
         return Cause(f"{begin}the inertias differ from the start values ({sizes}): {then}", "priors", value)
     if kind == "drift":
@@ -341,6 +350,47 @@ def _cause(trial: _Trial, solution: Solution, begin: str, then: str) -> Cause:
         ]
         return Cause(f"{begin}{places[0]} drifts slowly, by {max(spans):.2g} in SI: {then}", kind, places)
     return Cause(f"{begin}{_sizes(solution, trial.hypothesis.distortions)}: {then}", kind, places)
+
+
+class Sum(NamedTuple):
+    """A sum of inertias, on which a motion depends.
+
+    Attributes
+    ----------
+    name, about
+        The sum in parameters' names, and the motion.
+    off, error
+        Relative difference from the start values, and its standard error.
+    """
+
+    name: str
+    about: str
+    off: float
+    error: float
+
+
+def sums_of_inertias(solution: Solution) -> list[Sum]:
+    """The inertias that turn in pitch and in roll, see eq. (5): the motion of the wrist depends on these two sums of three inertias, so that
+    they are known better than each inertia alone. solution: of a fit that estimates all three."""
+    task, counts = solution.task, solution.fitter.model.known.counts
+    share = counts["N"].start ** 2 / (2 * counts["M"].start ** 2)
+    covariance = covariance_of(information_of(solution.jacobians) + task.prior_information())
+    found = []
+    for about, shares in (("in pitch", {"J2": 1.0, "H3": 0.5}), ("in roll", {"J2": 1.0, "J3": share})):
+        indices = [task.names.index(name) for name in shares]
+        parts = np.array([shares[name] * solution.values[name] for name in shares])
+        start = sum(shares[name] * task.start[name] for name in shares)
+        # Derivatives of the logarithm of the sum with respect to the logarithms of the inertias.
+        slope = parts / parts.sum()
+        error = float(np.sqrt(slope @ covariance[np.ix_(indices, indices)] @ slope))
+        name = " + ".join(n if x == 1 else f"{x:.4g} {n}" for n, x in shares.items())
+        found.append(Sum(name, about, float(parts.sum() / start - 1), error))
+    return found
+
+
+def _percent(off: float, error: float) -> str:
+    """A relative difference with its standard error."""
+    return f"{'+' if off > 0 else ''}{' +- '.join(rounded(100 * off, 100 * error))} %"
 
 
 def _sizes(solution: Solution, distortions: tuple[Distortion, ...]) -> str:

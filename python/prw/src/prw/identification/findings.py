@@ -152,9 +152,11 @@ class Findings:
 
     @property
     def unknown_cause(self) -> str:
-        """What was tried if no cause was found."""
+        """What was tried if no cause was found, and what was not."""
         tried = ", ".join([*self.explanation.tried, "changes over time, by fits of parts"])
-        return f"no known cause; none of these explains the data: {tried}"
+        others = self.explanation.left_out
+        not_tried = f"; not tried, because less was expected of them: {', '.join(others)}" if others else ""
+        return f"no known cause; none of these explains the data: {tried}{not_tried}"
 
     @property
     def parameters(self) -> dict[str, Estimate]:

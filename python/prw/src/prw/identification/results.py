@@ -135,6 +135,7 @@ class Identification(Findings):
                 "stopped": self.stopped,
                 "tried": [{"fault": f.name, "size": f.size, "standard_error": f.error} for f in self.verdict.faults],
                 "fitted": list(self.explanation.tried),
+                "not_fitted": list(self.explanation.left_out),
             },
             "parts": [
                 {
