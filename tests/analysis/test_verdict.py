@@ -248,6 +248,28 @@ def test_a_disturbance_is_noted(experiment, fmu, disturbance):
     assert any(note in each for each in found.notes), found.notes
 
 
+@pytest.mark.parametrize(
+    "frequency, given, subtracted",
+    [
+        (49.83, 50.0, ["recording: hum of tau1 of 49.83 Hz with an amplitude of 0.3 N.m is subtracted"]),
+        (16.77, 16.77, []),
+    ],
+)
+def test_hum_is_estimated_on_request(experiment, fmu, frequency, given, subtracted):
+    columns = recording(experiment)
+    humming = {**columns, "tau1": columns["tau1"] + 0.3 * np.sin(2 * np.pi * frequency * columns["time"] + 1)}
+    found = prw.identify(humming, hum={"tau1": given}, starts=1, fmu=fmu)
+    assert_contains(found, experiment)
+    without = prw.identify(columns, starts=1, fmu=fmu)
+    assert found.channels[0].residual == pytest.approx(without.channels[0].residual, rel=0.01)
+    assert [note for note in found.notes if "hum" in note] == subtracted
+
+
+def test_hum_of_a_channel_that_was_not_measured(experiment, fmu):
+    with pytest.raises(prw.UserError, match="hum: tau9 is not known"):
+        prw.identify(recording(experiment), hum={"tau9": 50}, fmu=fmu)
+
+
 def test_a_channel_that_is_not_explained_is_a_misfit(experiment, fmu):
     """Its residual is above the compared frequencies, so no other test detects it."""
     columns = recording(experiment)

@@ -99,6 +99,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     for kind, (metavar, explained) in effects.items():
         parser.add_argument(f"--{kind}", type=listed, default="", metavar=metavar, help=explained)
     parser.add_argument(
+        "--hum",
+        action=Named,
+        read=number,
+        metavar="NAME=HERTZ",
+        help="channel with hum, as in tau1=50, which is subtracted. May be repeated",
+    )
+    parser.add_argument(
         "--follow",
         type=int,
         nargs="?",

@@ -72,6 +72,7 @@ def identify(
     fading: Sequence[str] = (),
     crosstalk: Sequence[str] = (),
     drift: Sequence[str] = (),
+    hum: Mapping[str, float] = {},
     follow: int = 0,
     names: Mapping[str, str] = {},
     skip: int = 0,
@@ -130,6 +131,9 @@ def identify(
         Channels whose gain decreases linearly from 1 by a fraction during each recording.
     crosstalk
         Torque channels to which the other torque adds a share: "tau1", "tau2", or "torques" (equal in both).
+    hum
+        Frequency in Hz by channel that contains hum of the mains, such as {"tau1": 50}. Its frequency may differ by up to 0.5 Hz, but must
+        be exact if the motors move the channel at this frequency, too; the hum is then estimated with the parameters.
     follow
         Maximum number of steps in which the first cause of a misfit is assumed and the fit is repeated. A step is not taken if
         several causes explain the data, or if the cause needs a correction of the recording. See `assumed` and `stopped`.
@@ -195,7 +199,7 @@ def identify(
             dict.fromkeys(Distortion(kind, name) for kind, given in requested.items() for name in given)
         )
         given = values_of(parameters, model.loaded)
-        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions, drift)
+        task = task_of(model.known, estimate, priors, given, bounds, noise, offsets, distortions, drift, hum)
         measured = [
             each.recording()
             if isinstance(each, Run)
@@ -205,13 +209,13 @@ def identify(
             for each in several
         ]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
-        for argument, named in (("noise", noise), *requested.items(), ("drift", drift)):
+        for argument, named in (("noise", noise), *requested.items(), ("drift", drift), ("hum", hum)):
             check_names(argument, named, argument in KINDS and KINDS[argument].places or channels)
         rates: list[Rates] = [
             "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
             for each in several
         ]
-        how = [(quantum, rate, rate != "motors") for rate in rates]
+        how = [(quantum, rate, rate != "motors", hum) for rate in rates]
         experiments = [prepare(each, *more) for each, more in zip(measured, how)]
         # Recordings with very exact motor angles may be simulations of the FMU, in which the motors jump between steps. If the
         # model does not explain the data, these recordings are compared with the FMU's own steps.
@@ -223,7 +227,9 @@ def identify(
             verdict = judge(solution)
             for way in ways:
                 if not verdict.fits:
-                    again = [prepare(m, quantum, way) if x else e for m, x, e in zip(measured, exact, experiments)]
+                    again = [
+                        prepare(m, quantum, way, hum=hum) if x else e for m, x, e in zip(measured, exact, experiments)
+                    ]
                     other = fit(model, again, task, starts, seed)
                     if (better := judge(other)).fits:
                         experiments, solution, verdict = again, other, better
@@ -253,6 +259,7 @@ def task_of(
     offsets: bool = True,
     distortions: tuple[Distortion, ...] = (),
     drift: tuple[str, ...] = (),
+    hum: Mapping[str, float] = {},
 ) -> Task:
     """The task that these arguments of `identify` describe, for an FMU with the parameters `known`. Raises UserError for a
     name that is not known, or a value that is out of range."""
@@ -273,6 +280,8 @@ def task_of(
         not_negative("parameters", value, name)
     for name, value in noise.items():
         positive("noise", value, name)
+    for name, frequency in hum.items():
+        positive("hum", frequency, name)
     for name, span in bounds.items():
         if not isinstance(span, Sequence) or len(span) != 2:
             raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")
@@ -292,4 +301,4 @@ def task_of(
                 "or another start value in parameters"
             )
     spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
-    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions, drift)
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions, drift, dict(hum))

@@ -7,15 +7,16 @@ frequency.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.sparse import csr_matrix, diags
 
-from prw.columns import MEASURED
+from prw.columns import MEASURED, si_unit
 from prw.errors import UserError
 from prw.identification.path import Path, quantum_of, rough_noise, smooth
 from prw.motion import Array, Motion
@@ -45,6 +46,8 @@ EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
+#: Largest difference of the frequency of hum from its nominal value, Hz.
+SEARCHED = 0.5
 #: Minimum numbers of compared frequencies, and of values from which a channel's noise is estimated.
 MIN_FREQUENCIES, MIN_VALUES = 8, 20
 
@@ -186,11 +189,18 @@ def spectra(signals: Array) -> Complex:
     return np.fft.rfft(signals, axis=0, norm="ortho")
 
 
-def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False) -> Experiment:
+def prepare(
+    recording: Recording,
+    quantum: float = 0.0,
+    rates_of: Rates = "motors",
+    exact: bool = False,
+    hum: Mapping[str, float] = {},
+) -> Experiment:
     """Find the motors' paths in `recording`, and the errors of their samples and of the other encoders.
 
     quantum: of the motor angles in rad, if it is coarser than the data suggest. rates_of: see `Rates`. exact: the
-    samples are the motors' angles and rates. Raises UserError if a channel has too few values or no channel is measured."""
+    samples are the motors' angles and rates. hum: frequencies in Hz by channel, which is subtracted if the motors do not move the channel
+    there. Raises UserError if a channel has too few values or no channel is measured."""
     sampled, omega = recording.time, recording.omega
     channels, values, notes = _measured(recording)
     paths = [smooth(sampled, recording.theta[:, i], None if omega is None else omega[:, i], quantum) for i in (0, 1)]
@@ -216,6 +226,11 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
         jumps = np.vstack([np.zeros((1, 2)), theta[1:] - theta[:-1] - spacing * rates[:-1]])
     bins = max(_clear(t, e, path.rate_noise, spacing) for t, e, path in zip(theta.T, errors, paths))
     bins = min(max(bins, MIN_FREQUENCIES), len(time) // 2 + 1)
+    for name, frequency in hum.items():
+        if name in channels and frequency - SEARCHED > (bins - 1) / (len(time) * spacing):
+            i = channels.index(name)
+            values[:, i], note = _without_hum(sampled, values[:, i], name, frequency)
+            notes += (note,)
     channel_errors = np.zeros((DRAWS, bins, len(channels)), dtype=np.complex128)
     for i, column in enumerate(values.T):
         there = np.isfinite(column)
@@ -233,6 +248,30 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
         notes=notes,
         jumps=jumps,
     )
+
+
+def _without_hum(time: Array, column: Array, name: str, frequency: float) -> tuple[Array, str]:
+    """A channel (n,) without the hum at a frequency near `frequency`, Hz, and a note. The mains are not exact, so the hum is where the channel
+    has the most power within SEARCHED. The window suppresses the motion, which has other frequencies."""
+    there = np.isfinite(column)
+    known, values = time[there], column[there]
+    window = np.hanning(len(values))
+    windowed = (values - values.mean()) * window
+
+    def amplitude(at: float) -> complex:
+        return complex(2 / window.sum() * (np.exp(-2j * np.pi * at * known) @ windowed))
+
+    # A peak is as wide as the inverse of the duration.
+    spacing = min(SEARCHED, 1 / float(known[-1] - known[0])) / 4
+    trials = np.arange(frequency - SEARCHED, frequency + SEARCHED, spacing)
+    best = float(max(trials, key=lambda at: abs(amplitude(at))))
+    span = best - spacing, best + spacing
+    exact = float(
+        minimize_scalar(lambda at: -abs(amplitude(at)), bounds=span, method="bounded", options={"xatol": 1e-6}).x
+    )
+    size = amplitude(exact)
+    note = f"hum of {name} of {exact:.5g} Hz with an amplitude of {abs(size):.2g} {si_unit(name)} is subtracted"
+    return column - (size * np.exp(2j * np.pi * exact * time)).real, note
 
 
 def may_be_simulated(experiment: Experiment) -> bool:

@@ -14,7 +14,7 @@ Schoukens, 2nd ed., Sec. 9.11). The noise of each channel is given, or estimated
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple, cast
 
@@ -23,7 +23,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from prw.errors import UserError
 from prw.identification.effects import columns, including
-from prw.identification.experiment import Experiment, spectra
+from prw.identification.experiment import SEARCHED, Experiment, spectra
 from prw.identification.kinds import FILTERS, LINEAR
 from prw.identification.model import Model
 from prw.identification.response import FURTHEST, Discrete, Distortion, Response, discrete
@@ -82,6 +82,8 @@ class Task:
         Distortions, whose unknowns follow the logarithms of the parameters in every point (p,).
     drift
         Channels that may drift slowly.
+    hum
+        Approximate frequency in Hz by channel that contains hum.
     """
 
     names: tuple[str, ...]
@@ -92,6 +94,7 @@ class Task:
     offsets: bool
     distortions: tuple[Distortion, ...]
     drift: tuple[str, ...] = ()
+    hum: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -169,6 +172,16 @@ def slow(experiment: Experiment, channels: Sequence[str]) -> Complex:
     return found
 
 
+def humming(experiment: Experiment, hum: Mapping[str, float]) -> dict[int, Array]:
+    """Cosine and sine (n, 2) of the hum by index of the channel, if its frequency is compared. hum: frequencies in Hz by channel."""
+    found = {}
+    for i, name in enumerate(experiment.channels):
+        if name in hum and hum[name] - SEARCHED <= experiment.band:
+            turn = 2 * np.pi * hum[name] * experiment.time
+            found[i] = np.column_stack([np.cos(turn), np.sin(turn)])
+    return found
+
+
 class Comparison:
     """An experiment compared with the model, for one set of parameters and given noise.
 
@@ -182,7 +195,7 @@ class Comparison:
     initial
         (6,), difference x[0] - x[n] of the states at the start and at the end.
     drift
-        (n, c), drift of the channels, SI.
+        (n, c), drift of the channels, SI, and their hum.
     """
 
     def __init__(
@@ -211,7 +224,11 @@ class Comparison:
         s = 1j * np.arange(experiment.needed_bins) / experiment.bins
         for k, i in enumerate(edges):
             early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
-        linear = [steady, slow(experiment, task.drift), early, self.response.transients]
+        waves = humming(experiment, task.hum)
+        whole = np.zeros((experiment.needed_bins, channels, 2 * len(waves)), dtype=complex)
+        for k, (i, wave) in enumerate(waves.items()):
+            whole[:, i, 2 * k : 2 * k + 2] = spectra(wave)[: experiment.needed_bins]
+        linear = [steady, slow(experiment, task.drift), whole, early, self.response.transients]
         nuisance = experiment.observed(np.concatenate(linear, axis=2))
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
@@ -227,6 +244,9 @@ class Comparison:
         first, drifting = steady.shape[2], [i for i, name in enumerate(experiment.channels) if name in task.drift]
         self.drift = np.zeros((len(experiment.time), channels))
         self.drift[:, drifting] = paths @ found[first : first + DRIFT * len(drifting)].reshape(-1, DRIFT).T
+        first += DRIFT * len(drifting)
+        for k, (i, wave) in enumerate(waves.items()):
+            self.drift[:, i] += wave @ found[first + 2 * k : first + 2 * k + 2]
         self.offsets, self.initial = found[:channels] if task.offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
 

@@ -95,7 +95,10 @@ def _hum(time: Array, values: Array, unit: str) -> str:
         there = frequency[-1] > mains + AROUND[1] and line.any() and near.sum() > 10
         if there and power[line].max() > HUM * power[near].mean():
             amplitude = 4 * float(np.sqrt(power[line].max())) / len(values)
-            return f"hum of {mains:g} Hz with an amplitude of {amplitude:.2g} {unit}; shield the cable or ground the sensor"
+            return (
+                f"hum of {mains:g} Hz with an amplitude of {amplitude:.2g} {unit}; shield the cable or ground the sensor, or let it be "
+                "subtracted (hum)"
+            )
     return ""
 
 
