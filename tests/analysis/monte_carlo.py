@@ -140,6 +140,18 @@ def mixed(columns: dict, size: float, random: np.random.Generator) -> dict:
     return {**columns, "tau1": tau1 + size * tau2, "tau2": tau2 + size * tau1}
 
 
+def turned(columns: dict, size: float, random: np.random.Generator) -> dict:
+    """Returns the columns of an inertial sensor that is turned by `size` rad from pitch towards roll."""
+    pitch, roll = columns["pitch"], columns["roll"]
+    found = np.cos(size) * pitch + np.sin(size) * roll, np.cos(size) * roll - np.sin(size) * pitch
+    return {**columns, "pitch": found[0], "roll": found[1]}
+
+
+def fading(columns: dict, size: float, random: np.random.Generator) -> dict:
+    """Returns the columns with a gain of tau1 that decreases evenly by `size`."""
+    return {**columns, "tau1": columns["tau1"] * (1 - size * np.linspace(0, 1, len(columns["time"])))}
+
+
 def unsteady(simulated: rig.Rig, size: float, random: np.random.Generator) -> rig.Rig:
     """Returns the rig, sampled at times with errors of `size` s."""
     time = simulated.time
@@ -185,6 +197,32 @@ REAL = {
     "wrapped": Row("wrapped angles, beginning at, rad", (3.0, -2.9, 3.1), "restarts", recorded=wrapped),
     "crosstalk": Row("crosstalk of the torques, fraction", (0.01, -0.01, 0.02), "crosstalk", recorded=mixed),
     "jitter": Row("jitter of the times, s", (1e-4, 2e-4, 4e-4), "jitter", sampled=unsteady),
+    "springs": Row(
+        "excess of k2 on side 2, fraction",
+        (0.01, 0.03, 0.08),
+        "excess of k2",
+        lambda s: {"sides": (1.0, 1 + s, 1.0, 1.0)},
+    ),
+    "dampers": Row(
+        "excess of c1 on side 2, fraction",
+        (0.05, 0.1, -0.15),
+        "excess of c1",
+        lambda s: {"sides": (1.0, 1.0, 1 + s, 1.0)},
+    ),
+    "viscous": Row(
+        "viscous friction of the input shafts, N.m.s/rad",
+        (0.01, 0.03, 0.05),
+        "viscous friction in both",
+        lambda s: {"viscous": (s, 0.0)},
+    ),
+    "between": Row(
+        "viscous friction between the couplings, N.m.s/rad",
+        (0.01, 0.03, 0.05),
+        "viscous friction of both shafts between",
+        lambda s: {"viscous": (0.0, s)},
+    ),
+    "turned": Row("turned inertial sensor, rad", (0.003, 0.005, 0.02), "turn of the inertial sensor", recorded=turned),
+    "fading": Row("decrease of the gain of tau1, fraction", (0.01, 0.02, 0.05), "fading of tau1", recorded=fading),
 }
 
 
