@@ -34,7 +34,8 @@ OUTPUTS = [
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-test-kit/src/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     directory = tmp_path_factory.mktemp("rods")
-    # `make test` has built it with the Rust tests. With --package, cargo would compile crates again with other features.
+    # `make test` has built the program with the Rust tests. Built with --package, crates would have other features, so that cargo
+    # would compile them again.
     if "PROGRAMS" not in os.environ:
         build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
         subprocess.run(build, cwd=ROOT, check=True)

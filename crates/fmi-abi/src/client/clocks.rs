@@ -25,7 +25,7 @@ pub enum Interval {
 pub enum Qualifier {
     /// There is no interval yet.
     NotYetKnown,
-    /// The interval is the one that was read before.
+    /// The interval has not changed since it was last read.
     Unchanged,
     /// The interval is new.
     Changed,

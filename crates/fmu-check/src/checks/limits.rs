@@ -7,7 +7,7 @@ use crate::description::{Description, Variable};
 use crate::finding::failure_of;
 use crate::trajectory::{range, step_size};
 use crate::values::inputs_by;
-use crate::writer::{MAX_READ, Read, Trajectory, Writer, values_of};
+use crate::writer::{MAX_READ, Read, Trajectory, Writer, not_finite};
 use fmi_abi::Causality;
 
 /// Number of steps of a simulation at a limit.
@@ -69,17 +69,11 @@ impl Simulation {
             return None;
         }
         let unreadable = reads.filter(|id| !run.succeeds(*id)).find_map(|id| failure_of(sequence, run, id));
-        unreadable.or_else(|| not_finite(run, &self.reads, description))
+        unreadable.or_else(|| {
+            let (index, value) = not_finite(run, &self.reads, description)?;
+            Some(format!("{} is {value:?}", description.variables[index].name))
+        })
     }
-}
-
-/// Describes the first value that is not finite.
-fn not_finite(run: &Run, reads: &[Read], description: &Description) -> Option<String> {
-    values_of(run, reads).find_map(|(index, value)| {
-        let variable = &description.variables[index];
-        let is_bad = variable.is_float() && value.numbers().iter().any(|number| !number.is_finite());
-        is_bad.then(|| format!("{} is {}", variable.name, value.show(0)))
-    })
 }
 
 /// Returns the limits of the range of a variable that differ from its start value, each with the name of its attribute.
@@ -134,15 +128,19 @@ pub fn ranges(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     if trajectory.is_stepped() && description.event_mode() || description.variables.len() > MAX_READ {
         return Ok(());
     }
+    // A simulation that fails anyway shows nothing.
+    let mut writer = checker.writer(trajectory);
+    let usual = Simulation::write(&mut writer, &Change::Nothing);
+    let run = checker.execute(&writer.sequence)?;
+    if run.end != End::Done || usual.failure(&run, &writer.sequence, description).is_some() {
+        return Ok(());
+    }
     for (what, change) in changes(description, trajectory, checker.at_most(400)) {
         let mut writer = checker.writer(trajectory);
-        let usual = Simulation::write(&mut writer, &Change::Nothing);
         let changed = Simulation::write(&mut writer, &change);
         let (description, sequence) = (description.clone(), writer.sequence.clone());
         checker.check("dynamics.limits", writer.sequence, move |run| {
-            let failure = changed.failure(run, &sequence, &description)?;
-            let fails_anyway = usual.failure(run, &sequence, &description).is_some();
-            (!fails_anyway).then(|| format!("if {what}, {failure}"))
+            changed.failure(run, &sequence, &description).map(|failure| format!("if {what}, {failure}"))
         })?;
     }
     Ok(())

@@ -8,7 +8,7 @@ use crate::finding::failure_of;
 use crate::trajectory::step_size;
 use crate::values::{inputs_by, is_other_time};
 use crate::writer::Part::Make;
-use crate::writer::{Read, Trajectory, Writer, number_of, value_of};
+use crate::writer::{Read, Trajectory, Writer, not_finite, number_of, value_of};
 use fmi_abi::{Causality, Variability};
 use std::sync::Arc;
 
@@ -74,12 +74,8 @@ impl Simulation {
     /// Returns the name and the value of a floating-point variable that is not finite, and the time.
     fn not_finite(&self, run: &Run, description: &Description) -> Option<(String, f64, f64)> {
         self.steps.iter().zip(1..).find_map(|((_, reads), number)| {
-            reads.iter().flat_map(Read::parts).find_map(|(index, ..)| {
-                let numbers = value_of(run, reads, index)?.numbers();
-                let value = numbers.into_iter().find(|number| !number.is_finite())?;
-                let variable = &description.variables[index];
-                variable.is_float().then(|| (variable.name.clone(), value, self.end_of_step(number)))
-            })
+            let (index, value) = not_finite(run, reads, description)?;
+            Some((description.variables[index].name.clone(), value, self.end_of_step(number)))
         })
     }
 

@@ -10,7 +10,7 @@ use crate::legal::Modes;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Standard};
 pub use parts::{Calls, Part};
-pub use reads::{MAX_READ, Read, difference, number_of, sample, value_of, values_of};
+pub use reads::{MAX_READ, Read, difference, not_finite, number_of, sample, value_of, values_of};
 
 /// Point of a trajectory.
 #[derive(Clone, Debug, Default)]

@@ -109,6 +109,13 @@ pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (u
     })
 }
 
+/// Returns the variable and the value of the first floating-point number that is not finite.
+pub fn not_finite(run: &Run, reads: &[Read], description: &Description) -> Option<(usize, f64)> {
+    values_of(run, reads).filter(|(index, _)| description.variables[*index].is_float()).find_map(
+        |(index, value)| Some((index, value.numbers().into_iter().find(|number| !number.is_finite())?)),
+    )
+}
+
 /// Returns the first number of a variable in the first successful read that contains it.
 pub fn number_of(run: &Run, reads: &[Read], variable: usize) -> Option<f64> {
     value_of(run, reads, variable)?.numbers().first().copied()

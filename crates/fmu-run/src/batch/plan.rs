@@ -78,7 +78,7 @@ impl<'a> Plan<'a> {
                 let row = plan.outputs.len();
                 events.add_output(name, found, row, batch)?;
                 plan.columns.push(Column::Number(row));
-                // The clocks write the values of this output.
+                // `Ticking::show` writes this output into the row, so no variable is read here.
                 plan.outputs.push(name, &[]);
                 continue;
             }

@@ -1,8 +1,8 @@
 //! Clocks of FMI 3.0: ticks them in Event Mode, and sets and reads clocked variables while their clocks are active.
 //!
 //! [`fraction`] represents times of ticks exactly, and [`schedule`] calculates the next tick of a clock. [`Clocks`] are the clocks of an
-//! FMU, with the clocked variables of a batch, and [`Ticking`] ticks them in a run. Co-Simulation and Model Exchange call it at the same
-//! places: at the end of Initialization Mode, and instead of the update of discrete states in Event Mode.
+//! FMU, with the clocked variables of a batch, and [`Ticking`] ticks them in a run. Both interface types begin it at the end of
+//! Initialization Mode. In Event Mode they call it instead of updating the discrete states, because clocks are only active there.
 
 mod fraction;
 mod schedule;
@@ -32,7 +32,7 @@ pub(crate) enum Source<'a> {
     Declared { shift: Fraction, interval: Fraction },
     /// The FMU returns the interval, as a fraction or as a decimal number.
     Asked { variability: IntervalVariability, is_fraction: bool },
-    /// The caller, who has given these times, s.
+    /// Times that the caller gives, s.
     Given(&'a [f64]),
     /// The FMU activates the clock in Event Mode.
     Fmu,
@@ -72,7 +72,7 @@ pub(crate) struct Ticking<'a> {
     /// Next tick of each clock, s.
     next: Vec<Option<f64>>,
     chatter: Vec<Chatter>,
-    /// Whether each clock is active in the current iteration of the event.
+    /// For each clock, whether it is active in the current iteration of the event.
     active: Vec<bool>,
     /// Indices of the clocks that have ticked in the last event.
     pub ticked: Vec<usize>,
