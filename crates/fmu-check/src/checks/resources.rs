@@ -8,7 +8,7 @@ use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, R
 use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::{BaseType, Causality, Initial};
 
-/// Checks for leaks by repeating simulations, string setters, resets and saved states. Then checks the settings of the process.
+/// Checks for leaks by repeating simulations, string setters, resets and saved states. Then checks the settings and the output of the process.
 pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let repeat = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
         let mut writer = checker.writer(trajectory);
@@ -48,7 +48,8 @@ pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             writer.write(0, &[ReadAll, Drop(0)]);
         })?;
     }
-    settings(checker, trajectory)
+    settings(checker, trajectory)?;
+    printed(checker, trajectory)
 }
 
 /// Maximum number of repetitions before the first measurement. They are needed because the first cycles may allocate memory that
@@ -131,7 +132,7 @@ fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str
         .then(|| format!("{grown} bytes remain after {times} {what}: {} for each", grown / times as u64))
 }
 
-/// Checks that a simulation changes no settings of the process, and that nothing is printed until the library is unloaded.
+/// Checks that a simulation changes no settings of the process.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
@@ -140,16 +141,22 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let alive = writer.add(Step::Measure);
     writer.write(0, &[Call("Terminate"), Free]);
     let freed = writer.add(Step::Measure);
-    writer.add(Step::Unload);
-    let run = checker.evaluate("resources.settings", writer.sequence.clone(), move |run| {
+    checker.check("resources.settings", writer.sequence, move |run| {
         let measured = |id| run.outcome(id)?.measured.as_ref();
         let before = measured(first)?;
         let while_alive = measured(alive).and_then(|alive| changed_setting(before, alive, false));
         while_alive.or_else(|| changed_setting(before, measured(freed)?, true))
-    })?;
-    checker.record("logs.printed", &run, &writer.sequence, |run| {
+    })
+}
+
+/// Checks that nothing is printed until the library is unloaded. This is not a part of [`settings`], because a library that leaves a
+/// thread may crash when it is unloaded, which would hide a changed setting.
+fn printed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let mut writer = checker.writer(trajectory);
+    writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
+    writer.add(Step::Unload);
+    checker.check("logs.printed", writer.sequence, |run| {
         let line = run.output.lines().find(|line| !line.trim().is_empty())?;
-        (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
-    });
-    Ok(())
+        Some(format!("{:?}", line.chars().take(80).collect::<String>()))
+    })
 }

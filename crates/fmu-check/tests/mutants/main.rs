@@ -168,11 +168,11 @@ together! {
     resources_of_fmi2_1 2 "resources" {
         thread_left "resources.threads";
         locale_changed "resources.settings";
-        step_prints "logs.printed";
     }
     resources_of_fmi2_2 2 "resources" {
         leak_step "resources.memory";
         environment_changed "resources.settings";
+        step_prints "logs.printed";
     }
     resources_of_fmi2_3 2 "resources" {
         string_leaks "resources.memory";
