@@ -1,7 +1,7 @@
 //! Model descriptions that are unusual or wrong: what is read, and what is reported.
 #![cfg(feature = "description")]
 
-use fmi_abi::description::{Fault, ModelDescription};
+use fmi_abi::description::{Fault, Item, ModelDescription};
 use fmi_abi::{BaseUnit, Causality, DisplayUnit, Unit};
 
 fn fmi2(offer: &str, variables: &str, rest: &str) -> ModelDescription {
@@ -36,15 +36,17 @@ fn blanks_around_numbers_and_booleans_do_not_count() {
     let of_type = "<Real declaredType='T' max=' 9 ' nominal=' 4 ' start=' 7 '/>";
     let found = fmi2("canGetAndSetFMUstate=' true '", &variable("x", " 1 ", "parameter", of_type), units);
     assert_eq!(found.faults, []);
-    let (offer, x) = (found.co_simulation.unwrap(), &found.variables[0]);
+    let (offer, x) = (found.co_simulation.as_ref().unwrap(), &found.variables[0]);
     assert!(offer.saves_states && offer.can(&["canGetAndSetFMUstate"]));
     let deg = DisplayUnit { name: "deg".to_owned(), factor: 57.5, offset: 2.0 };
     let rad = BaseUnit { exponents: [0, 0, 0, 0, 0, 0, 0, 1], ..BaseUnit::ONE };
     assert_eq!(found.units["rad"], Unit { base: Some(rad), display_units: vec![deg] });
-    assert_eq!(found.enumerations["E"], [("i".to_owned(), 3)]);
+    let item = Item { name: "i".to_owned(), value: 3, description: String::new() };
+    assert_eq!(found.items_of(Some("E")), Some(&[item][..]));
     assert_eq!(found.default_experiment, [None, Some(2.0), None]);
-    assert_eq!((x.reference, x.min, x.max, x.nominal), (1, Some(-1.0), Some(9.0), 4.0));
-    assert_eq!((&*x.start, x.is_relative, x.causality), (&["7".to_owned()][..], true, Causality::Parameter));
+    assert_eq!((x.reference, x.min(), x.max(), x.nominal()), (1, Some(-1.0), Some(9.0), 4.0));
+    let is_relative = x.attributes.is_relative;
+    assert_eq!((&*x.start, is_relative, x.causality), (&["7".to_owned()][..], true, Causality::Parameter));
 }
 
 /// A unit that is written has all digits, so it is the same when it is read.
@@ -190,12 +192,12 @@ fn what_counts_once_is_reported() {
         [
             (Fault::Experiment, "the tolerance -1 is negative"),
             (Fault::Unit, "two units are called m"),
+            (Fault::Definition, "the item b = 1 of E has the name or the value of another item"),
             (Fault::Definition, "y is of type Float64, but its declaredType is of type Int8"),
             (
                 Fault::Dimension,
                 "the size of y is the variable 2, which is neither a structural parameter nor a constant of type UInt64"
             ),
-            (Fault::Definition, "the item b = 1 of E has the name or the value of another item"),
             (Fault::Unknown, "an Output of ModelStructure has 2 dependenciesKind, but 1 dependencies"),
             (Fault::Unknown, "ModelStructure lists y twice as Output"),
             (Fault::Unknown, "the event indicator n is not a continuous floating-point number"),

@@ -141,7 +141,8 @@ const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
 /// Returns the rules for the messages that a call logs.
 fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> {
     MESSAGE_TESTS.into_iter().map(move |(name, test)| {
-        let (categories, standard) = (description.log_categories.clone(), description.standard);
+        let categories = description.log_categories.iter().map(|of| of.name.clone()).collect::<Vec<_>>();
+        let standard = description.standard;
         rule(name, move |run| {
             run.outcome(id)?.log.iter().find_map(|message| {
                 let text = show(message.text.as_deref().unwrap_or_default());

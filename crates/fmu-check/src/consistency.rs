@@ -135,7 +135,7 @@ fn unequal(set: &[&Variable]) -> Option<String> {
         .or_else(|| {
             differ(&|one, other| is_constant(one) && starts(one) != starts(other), "other start values")
         })
-        .or_else(|| differ(&|one, other| one.unit != other.unit, "other units"))
+        .or_else(|| differ(&|one, other| one.attributes.unit != other.attributes.unit, "other units"))
 }
 
 /// FMI 3.0 ignores the attribute in other interface types than Model Exchange.

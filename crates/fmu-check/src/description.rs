@@ -88,7 +88,8 @@ impl Description {
         } else if self.token.is_empty() {
             wrong.push(("description.empty-token", format!("{token} is empty")));
         }
-        if self.co_simulation.is_none() && self.model_exchange.is_none() && !self.scheduled_execution {
+        if self.co_simulation.is_none() && self.model_exchange.is_none() && self.scheduled_execution.is_none()
+        {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
@@ -121,19 +122,21 @@ impl Description {
                 let why = format!("{name} is not an output, but is among the outputs of ModelStructure");
                 add("description.structure", why);
             }
-            if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit)) {
+            if let Some(unit) =
+                variable.attributes.unit.as_ref().filter(|unit| !self.units.contains_key(&***unit))
+            {
                 let why = format!("{name} is in \"{}\", which is not a unit of UnitDefinitions", shown(unit));
                 add("description.units", why);
             }
             let declared = variable.declared_type.as_ref();
-            if let Some(declared) = declared.filter(|declared| !self.types.contains(*declared)) {
+            if let Some(declared) = declared.filter(|declared| !self.types.contains_key(*declared)) {
                 let why = format!(
                     "{name} is of type \"{}\", which is not among the TypeDefinitions",
                     shown(declared)
                 );
                 add("description.types", why);
             }
-            if variable.display_unit.is_some() && variable.unit.is_none() {
+            if variable.attributes.display_unit.is_some() && variable.attributes.unit.is_none() {
                 add("description.units", format!("{name} has a displayUnit, but no unit"));
             }
             wrong.extend(faults(self.standard, variable));
@@ -273,13 +276,13 @@ fn faults(standard: Standard, variable: &Variable) -> Vec<Observation> {
     if initial == Some(Initial::Calculated) && !variable.start.is_empty() && variable.base.is_some() {
         add("description.start", format!("{name} is calculated and has a start value"));
     }
-    if let (Some(min), Some(max)) = (variable.min, variable.max)
+    if let (Some(min), Some(max)) = (variable.min(), variable.max())
         && let Some(why) = empty_range(min, max)
     {
         add("description.range", format!("the range of {name} is empty: {why}"));
     }
     let outside = |number: &f64| {
-        variable.min.is_some_and(|min| *number < min) || variable.max.is_some_and(|max| *number > max)
+        variable.min().is_some_and(|min| *number < min) || variable.max().is_some_and(|max| *number > max)
     };
     if let Some(number) = variable.starts().into_iter().find(outside) {
         let why = format!("the start value of {name}, {number}, is outside its min and max");

@@ -90,7 +90,7 @@ fn setting(
 ) -> (Setting, Vec<(&'static str, String)>) {
     let mut libraries = [None, None];
     let mut without = Vec::new();
-    if description.scheduled_execution {
+    if description.scheduled_execution.is_some() {
         without.push((INTERFACES[2], "fmu-check has no checks for Scheduled Execution".to_owned()));
     }
     for (index, offer) in [&description.co_simulation, &description.model_exchange].into_iter().enumerate() {

@@ -44,14 +44,14 @@ pub fn other_values(description: &Description, index: usize) -> Option<Values> {
         BaseType::String => Values::strings("Gödel, Escher, Bach".as_bytes(), size),
         BaseType::Binary => Values::strings(&Vec::from_iter((0..300).map(|byte| (byte % 256) as u8)), size),
         BaseType::Boolean => Values::new(kind, starts.iter().map(|start| 1.0 - start)),
-        BaseType::Enumeration if variable.max.is_none() => return None,
+        BaseType::Enumeration if variable.max().is_none() => return None,
         _ => {
-            let other = |start: &f64| match variable.max.is_some_and(|max| start + 1.0 > max) {
+            let other = |start: &f64| match variable.max().is_some_and(|max| start + 1.0 > max) {
                 true => start - 1.0,
                 false => start + 1.0,
             };
             let others: Vec<f64> = starts.iter().map(other).collect();
-            let inside = |number: &f64| variable.min.is_none_or(|min| *number >= min);
+            let inside = |number: &f64| variable.min().is_none_or(|min| *number >= min);
             if !others.iter().all(inside) {
                 return None;
             }
@@ -126,11 +126,12 @@ pub fn other_numbers(description: &Description, causalities: &[Causality]) -> Ve
 /// Returns the number within the range of a variable that is nearest to `start + by * scale`. The scale is the nominal value or
 /// the magnitude of the start value (at most 1e6), whichever is larger, but at most the width of the range.
 pub fn near(variable: &Variable, start: f64, by: f64) -> f64 {
-    let range = variable.min.zip(variable.max).map(|(min, max)| max - min).filter(|range| range.is_finite());
-    let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal.max(start.abs().min(1e6)));
+    let range =
+        variable.min().zip(variable.max()).map(|(min, max)| max - min).filter(|range| range.is_finite());
+    let scale = range.unwrap_or(f64::INFINITY).min(variable.nominal().max(start.abs().min(1e6)));
     let number = start + by * scale;
-    let number = variable.min.map_or(number, |min| number.max(min));
-    variable.max.map_or(number, |max| number.min(max))
+    let number = variable.min().map_or(number, |min| number.max(min));
+    variable.max().map_or(number, |max| number.min(max))
 }
 
 /// Returns whether a time differs from another one by more than rounding errors.

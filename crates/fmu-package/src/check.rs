@@ -4,10 +4,10 @@
 
 use crate::instance::Instance;
 use crate::model::LoadedModel;
-use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
+use crate::table::{Info, Start, Table, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmi_abi::{
-    BaseType, BaseUnit, Causality, Standard, Value, Variability, empty_range, ends_too_early,
+    BaseType, BaseUnit, Causality, Standard, Unit, Value, Variability, empty_range, ends_too_early,
     is_c_identifier, is_structured_name,
 };
 use std::collections::HashSet;
@@ -36,13 +36,11 @@ pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
         );
-        let variable_type = &variable.variable_type;
-        let named = if variable_type.name.is_empty() {
-            "its type".to_owned()
-        } else {
-            format!("the type {}", variable_type.name.escape_debug())
+        let named = match &variable.declared_type {
+            None => "its type".to_owned(),
+            Some(declared) => format!("the type {}", declared.escape_debug()),
         };
-        check_type(variable_type).with_context(|| format!("{name} cannot have {named}"))?;
+        check_type(variable).with_context(|| format!("{name} cannot have {named}"))?;
         check_references(table, variable)?;
     }
     let is_time = |variable: &Variable| variable.causality == Causality::Independent;
@@ -102,11 +100,11 @@ fn check_info(info: &Info) -> Result<()> {
         info.identifier.escape_debug()
     );
     for (fact, text) in [
-        ("description", &info.description),
-        ("author", &info.author),
-        ("version", &info.version),
-        ("license", &info.license),
-        ("copyright", &info.copyright),
+        ("description", &info.about.description),
+        ("author", &info.about.author),
+        ("version", &info.about.version),
+        ("license", &info.about.license),
+        ("copyright", &info.about.copyright),
     ] {
         check_line(format_args!("the {fact} of {}", info.name), text)?;
     }
@@ -127,39 +125,49 @@ fn none(reason: Option<String>) -> Result<()> {
     reason.map_or(Ok(()), |why| Err(anyhow!(why)))
 }
 
-fn check_type(variable_type: &Type) -> Result<()> {
-    check_line("its name", &variable_type.name)?;
-    match &variable_type.attributes {
-        Attributes::Real { quantity, unit, min, max, nominal } => {
-            check_line(format_args!("its quantity '{}'", quantity.escape_debug()), quantity)?;
-            for (name, limit) in [("min", min), ("max", max)] {
-                let limit = limit.map(|limit| rounded(variable_type.base, limit));
-                ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
-            }
-            if let (Some(min), Some(max)) = (min, max) {
-                none(empty_range(min, max)).context("its range is empty")?;
-            }
-            if let Some(nominal) = *nominal {
-                ensure!(is_positive(nominal), "the nominal value must be finite and > 0, it is {nominal}");
-            }
-            check_unit(unit)
-        }
-        Attributes::Integer { min, max } => none(empty_range(min, max)).context("its range is empty"),
-        Attributes::Enumeration(items) => {
-            ensure!(!variable_type.name.is_empty(), "an Enumeration needs a name (section 2.2.7 of FMI 2.0)");
-            ensure!(!items.is_empty(), "it has no items");
-            let (mut names, mut values) = (HashSet::new(), HashSet::new());
-            for item in items {
-                check_name("the item", &item.name)?;
-                check_line(format_args!("the description of its item {}", item.name), &item.description)?;
-                ensure!(names.insert(&item.name), "it has two items with the name {}", item.name);
-                ensure!(values.insert(item.value), "it has two items with the value {}", item.value);
-            }
-            Ok(())
-        }
-        Attributes::Binary { mime_type, .. } => check_name("its MIME type", mime_type),
-        _ => Ok(()),
+fn check_type(variable: &Variable) -> Result<()> {
+    let of = &variable.attributes;
+    variable.declared_type.iter().try_for_each(|name| check_line("its name", name))?;
+    if let Some(quantity) = &of.quantity {
+        check_line(format_args!("its quantity '{}'", quantity.escape_debug()), quantity)?;
     }
+    if variable.is_float() {
+        let limits = [("min", variable.min()), ("max", variable.max())];
+        for (name, limit) in limits {
+            let limit = limit.map(|limit| rounded(variable.base, limit));
+            ensure!(limit.is_none_or(f64::is_finite), "{name} must be a finite number");
+        }
+        if let [(_, Some(min)), (_, Some(max))] = limits {
+            none(empty_range(min, max)).context("its range is empty")?;
+        }
+    }
+    if let Some((min, max)) = variable.range() {
+        none(empty_range(min, max)).context("its range is empty")?;
+    }
+    if let Some(nominal) = of.nominal {
+        ensure!(is_positive(nominal), "the nominal value must be finite and > 0, it is {nominal}");
+    }
+    if let (Some(name), Some(unit)) = (&of.unit, &variable.unit) {
+        check_unit(name, unit)?;
+    }
+    if variable.base == BaseType::Enumeration {
+        check_items(variable)?;
+    }
+    of.mime_type.iter().try_for_each(|mime_type| check_name("its MIME type", mime_type))
+}
+
+fn check_items(variable: &Variable) -> Result<()> {
+    let is_declared = variable.declared_type.is_some();
+    ensure!(is_declared, "an Enumeration needs a name (section 2.2.7 of FMI 2.0)");
+    ensure!(!variable.items.is_empty(), "it has no items");
+    let (mut names, mut values) = (HashSet::new(), HashSet::new());
+    for item in &variable.items {
+        check_name("the item", &item.name)?;
+        check_line(format_args!("the description of its item {}", item.name), &item.description)?;
+        ensure!(names.insert(&item.name), "it has two items with the name {}", item.name);
+        ensure!(values.insert(item.value), "it has two items with the value {}", item.value);
+    }
+    Ok(())
 }
 
 /// Rounds a number to the precision of the type.
@@ -170,10 +178,10 @@ pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
     }
 }
 
-fn check_unit(unit: &Unit) -> Result<()> {
-    let display = unit.display.as_ref().map(|of| ("display unit", &of.name, of.factor, of.offset));
-    let own = ("unit", &unit.name, unit.base.factor, unit.base.offset);
-    for (kind, name, factor, offset) in [own].into_iter().chain(display) {
+fn check_unit(name: &str, unit: &Unit) -> Result<()> {
+    let displays = unit.display_units.iter().map(|of| ("display unit", &*of.name, of.factor, of.offset));
+    let own = unit.base.iter().map(|base| ("unit", name, base.factor, base.offset));
+    for (kind, name, factor, offset) in own.chain(displays) {
         check_name(format_args!("the name of its {kind}"), name)?;
         ensure!(
             factor.is_finite() && factor != 0.0,
@@ -187,10 +195,10 @@ fn check_unit(unit: &Unit) -> Result<()> {
 /// Checks the variables that a variable refers to: the variable whose derivative it is, and the variables in its `depends_on`.
 fn check_references(table: &Table, variable: &Variable) -> Result<()> {
     let name = &variable.name;
-    if let Some(index) = variable.differentiates {
-        let other = &table.variables[index as usize];
+    if let Some(index) = variable.derivative_of {
+        let other = &table.variables[index];
         ensure!(
-            other.base() == BaseType::Real
+            other.base == BaseType::Real
                 && other.variability == Variability::Continuous
                 && other.name != *name,
             "{name} cannot be the derivative of {}",
@@ -198,7 +206,7 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
         );
     }
     if let Some(other) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')'))
-        && variable.differentiates.is_none()
+        && variable.derivative_of.is_none()
     {
         ensure!(
             !table.variables.iter().any(|variable| variable.name == other),
@@ -222,7 +230,7 @@ fn check_references(table: &Table, variable: &Variable) -> Result<()> {
 /// Checks that each state has exactly one derivative.
 fn check_derivatives(table: &Table) -> Result<()> {
     for &(state, _) in &table.states {
-        let count = table.find(|variable| variable.differentiates == Some(state)).len();
+        let count = table.find(|variable| variable.derivative_of == Some(state as usize)).len();
         let name = table.name(state);
         ensure!(count == 1, "the state {name} has {count} derivatives among the variables");
     }
@@ -236,11 +244,13 @@ const SECOND: usize = 2;
 /// may be left out.
 fn check_units(table: &Table) -> Result<()> {
     for &(state, rate) in &table.states {
-        let of = |index: u32| table.variable(index).and_then(|variable| variable.variable_type.unit());
-        let (Some(unit), Some(unit_of_rate)) = (of(state), of(rate)) else { continue };
-        let [of_state, of_rate] = [unit.base, unit_of_rate.base];
+        let of = |index: u32| {
+            let variable = table.variable(index)?;
+            Some((variable.attributes.unit.as_deref()?, variable.unit.as_ref()?.base?))
+        };
+        let (Some((unit, of_state)), Some((unit_of_rate, of_rate))) = (of(state), of(rate)) else { continue };
         let has_unit = |unit: BaseUnit| unit.exponents.iter().any(|exponent| *exponent != 0);
-        if !has_unit(of_rate) || !has_unit(of_state) && of_state.factor == 1.0 && unit.name != "1" {
+        if !has_unit(of_rate) || !has_unit(of_state) && of_state.factor == 1.0 && unit != "1" {
             continue;
         }
         let mut per_second = of_state;
@@ -250,16 +260,16 @@ fn check_units(table: &Table) -> Result<()> {
         ensure!(
             expected == found,
             "{name_of_rate} is in {} ({found}), but {name} is in {}, so the unit of its derivative has the exponents {expected}",
-            unit_of_rate.name,
-            unit.name
+            unit_of_rate,
+            unit
         );
         ensure!(
             (of_state.factor - of_rate.factor).abs() <= 1e-9 * of_state.factor.abs(),
             "{name_of_rate} is in {}, whose factor is {}, but {name} is in {}, whose factor is {}; importers integrate the numbers, so \
              both factors must be equal",
-            unit_of_rate.name,
+            unit_of_rate,
             of_rate.factor,
-            unit.name,
+            unit,
             of_state.factor
         );
     }
@@ -292,11 +302,7 @@ fn check_starts(table: &Table) -> Result<Starts> {
     for (_, starts) in &all {
         for (variable, start) in table.variables.iter().zip(*starts) {
             if let Some(start) = start {
-                check_value(
-                    &format!("the start value of {}", variable.name),
-                    &variable.variable_type,
-                    start,
-                )?;
+                check_value(&format!("the start value of {}", variable.name), variable, start)?;
             }
         }
     }
@@ -319,32 +325,36 @@ fn check_starts(table: &Table) -> Result<Starts> {
 }
 
 /// Checks that a value fits its type: the range, the items of an Enumeration, the size of bytes, and the characters of a string.
-fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
-    match (&variable_type.attributes, value) {
-        (Attributes::Real { min, max, .. }, Value::Real(real)) => {
+fn check_value(label: &str, variable: &Variable, value: &Value) -> Result<()> {
+    match value {
+        Value::Real(real) => {
             ensure!(real.is_finite(), "{label} must be a finite number, it is {value}");
-            if let Some(min) = min {
-                let fits = *real >= rounded(variable_type.base, *min);
-                ensure!(fits, "{label} must be >= {}, it is {value}", Value::Real(*min));
+            if let Some(min) = variable.min() {
+                let fits = *real >= rounded(variable.base, min);
+                ensure!(fits, "{label} must be >= {}, it is {value}", Value::Real(min));
             }
-            if let Some(max) = max {
-                let fits = *real <= rounded(variable_type.base, *max);
-                ensure!(fits, "{label} must be <= {}, it is {value}", Value::Real(*max));
+            if let Some(max) = variable.max() {
+                let fits = *real <= rounded(variable.base, max);
+                ensure!(fits, "{label} must be <= {}, it is {value}", Value::Real(max));
             }
         }
-        (Attributes::Integer { min, max }, Value::Integer(value)) => {
-            ensure!((min..=max).contains(&value), "{label} must be between {min} and {max}, it is {value}");
-        }
-        (Attributes::Enumeration(items), Value::Integer(value)) => {
+        Value::Integer(value) if variable.base == BaseType::Enumeration => {
+            let items = &variable.items;
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
             let is_known = items.iter().any(|item| i128::from(item.value) == *value);
             ensure!(is_known, "{label} must be one of {}, it is {value}", known.join(", "));
         }
-        (Attributes::Binary { max_size, .. }, Value::Binary(bytes)) => {
-            let size = bytes.len();
-            ensure!(size <= *max_size, "{label} must have at most {max_size} bytes, it has {size}");
+        Value::Integer(value) => {
+            let Some((min, max)) = variable.range() else { return Ok(()) };
+            ensure!((min..=max).contains(value), "{label} must be between {min} and {max}, it is {value}");
         }
-        (Attributes::Other, Value::String(text)) => {
+        Value::Binary(bytes) => {
+            let (size, max_size) = (bytes.len() as u64, variable.attributes.max_size);
+            if let Some(max_size) = max_size.filter(|max_size| size > *max_size) {
+                bail!("{label} must have at most {max_size} bytes, it has {size}");
+            }
+        }
+        Value::String(text) => {
             // XML 1.0 forbids most other control characters, and discourages the rest (U+007F to U+009F).
             let is_possible = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
             ensure!(
@@ -352,7 +362,7 @@ fn check_value(label: &str, variable_type: &Type, value: &Value) -> Result<()> {
                 "{label} has a control character that must not be in XML: {text:?}"
             );
         }
-        _ => {}
+        Value::Boolean(_) => {}
     }
     Ok(())
 }

@@ -2,11 +2,10 @@
 
 use crate::check::{check_line, check_name};
 use crate::content::ContentFile;
-use crate::definitions::{filled, list};
 use crate::model::LoadedModel;
 use anyhow::{Context, Result, ensure};
 use fmi_abi::Causality;
-use fmi_abi::write::Element;
+use fmi_abi::write::{Element, filled};
 use std::collections::HashSet;
 
 /// A terminal of an FMU for FMI 3.0: a connector with variables as its members.
@@ -115,7 +114,7 @@ impl Terminal {
             let found =
                 found.with_context(|| format!("its member {name} is {variable}, which is not a variable"))?;
             ensure!(
-                found.dimensions.is_empty(),
+                found.shape.is_empty(),
                 "its member {name} is {variable}, an element of an array, which terminals cannot have"
             );
             use Causality::*;
@@ -178,7 +177,9 @@ pub fn terminals(
         ensure!(names.insert(name), "there are two terminals with the name {name}");
         terminal.check(model, content).with_context(|| format!("the terminal {name}"))?;
     }
-    let Some(list) = list("Terminals", terminals.iter().map(Terminal::element)) else { return Ok(None) };
+    let Some(list) = Element::list("Terminals", terminals.iter().map(Terminal::element)) else {
+        return Ok(None);
+    };
     // FMI 3.0 defines this file, so an FMU for FMI 2.0 would have this version as well (section 2.4.9 of FMI 3.0).
     let root = Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0");
     Ok(Some(root.containing([list]).document()?))

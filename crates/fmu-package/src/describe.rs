@@ -3,16 +3,15 @@
 //! The variables of the table are followed by variables that only FMI 3.0 needs: the time, unless the model declares it, and the
 //! event indicators. In FMI 3.0, value references count from 1 in this order, and an array occupies as many as it has elements.
 
-use crate::definitions::{
-    filled, items, list, type_definitions, unit_definitions, with_attributes, with_range,
-};
 use crate::model::LoadedModel;
-use crate::structure::{ModelStructure, Unknown, checked_starts};
-use crate::table::{CoSimulation, ModelExchange, Table, Type, Variable};
-use anyhow::{Result, bail, ensure};
+use crate::structure::{self, ModelStructure, checked_starts};
+use crate::table::{CoSimulation, ModelExchange, Table, Variable};
+use anyhow::{Result, anyhow, bail, ensure};
+use fmi_abi::description::{self, Attributes, LogCategory, ModelDescription, Offer, Type, Unknown};
 use fmi_abi::stamp::NO_GUID;
-use fmi_abi::write::Element;
-use fmi_abi::{BaseType, Category, Causality, Standard, Value, Variability};
+use fmi_abi::{BaseType, Category, Causality, Initial, Standard, Unit, Value, Variability};
+use indexmap::IndexMap;
+use indexmap::map::Entry;
 
 /// Values of the description that differ from the compiled model.
 #[derive(Clone, Debug, Default)]
@@ -31,12 +30,12 @@ pub struct Changes {
 /// variable has the same name as one that is generated for FMI 3.0.
 pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result<String> {
     let table = &model.table;
-    let lacking = table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
+    let lacking = table.variables.iter().find(|variable| !variable.base.is_in_fmi2());
     if let (Some(variable), Standard::Fmi2) = (lacking, fmi) {
         bail!(
             "{} is {}, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only",
             variable.name,
-            variable.base()
+            variable.base
         );
     }
     let try_model = || {
@@ -48,12 +47,8 @@ pub fn describe(model: &LoadedModel, fmi: Standard, changes: &Changes) -> Result
     // A panic is reported first, because other errors may only be its consequences.
     model.monitor.check()?;
     let (starts, structure) = tried?;
-    Description { table, fmi, changes }.document(starts, &structure)
-}
-
-/// Counts from 1 instead of 0, as the indices of FMI 2.0 and the value references of FMI 3.0 do.
-fn position(index: u32) -> u32 {
-    index + 1
+    let description = Description { table, fmi, changes }.of_model(starts, &structure)?;
+    description.to_xml().map_err(|why| anyhow!(why))
 }
 
 struct Description<'a> {
@@ -63,272 +58,248 @@ struct Description<'a> {
 }
 
 impl Description<'_> {
-    fn document(&self, starts: &[Option<Value>], structure: &ModelStructure) -> Result<String> {
-        let Self { table, fmi, .. } = self;
-        let is_fmi2 = *fmi == Standard::Fmi2;
+    fn of_model(&self, starts: &[Option<Value>], structure: &ModelStructure) -> Result<ModelDescription> {
+        let Self { table, fmi, .. } = *self;
+        let is_fmi3 = fmi == Standard::Fmi3;
         let described: Vec<_> =
-            (0..).zip(&table.variables).filter(|(_, variable)| is_fmi2 || variable.element == 0).collect();
-        let types: Vec<_> = described.iter().map(|(_, variable)| &variable.variable_type).collect();
-        let names: Vec<_> = described.iter().map(|(_, variable)| self.name(variable)).collect();
+            (0..).zip(&table.variables).filter(|(_, variable)| !is_fmi3 || variable.element == 0).collect();
         let generated = self.generated();
-        for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
+        // The position of each variable in the description, by its index in the table.
+        let indices =
+            described.iter().map(|(index, _)| *index).chain(generated.iter().map(|(index, _)| *index));
+        let positions: IndexMap<u32, usize> = indices.zip(0..).collect();
+        let own =
+            described.iter().map(|(index, variable)| self.variable(*index, variable, starts, &positions));
+        let mut variables: Vec<_> = own.collect();
+        for (_, generated) in generated {
             ensure!(
-                !names.contains(&name),
-                "{name} is the name of a variable that FMI 3.0 needs; declare it as independent if it is the time, else rename it"
+                !variables.iter().any(|variable| variable.name == generated.name),
+                "{} is the name of a variable that FMI 3.0 needs; declare it as independent if it is the time, else rename it",
+                generated.name
             );
+            variables.push(generated);
         }
-        let variables = described
-            .iter()
-            .map(|(index, variable)| self.variable(*index, variable, starts))
-            .chain(generated);
-        let children = [
-            table.model_exchange.as_ref().map(|offer| self.model_exchange(offer)),
-            table.co_simulation.as_ref().map(|offer| self.co_simulation(offer)),
-            unit_definitions(&types)?,
-            type_definitions(&types, &names, |definition| self.type_definition(definition))?,
-            list("LogCategories", Category::ALL.map(log_category)),
-            Some(default_experiment(table)),
-            Some(Element::new("ModelVariables").containing(variables)),
-            Some(self.structure(structure)),
-        ];
-        Ok(self.root().containing(children.into_iter().flatten()).document()?)
+        let unknowns = |list: &[structure::Unknown]| list.iter().map(|of| unknown(of, &positions)).collect();
+        let indicators = 0..if is_fmi3 { table.indicators() } else { 0 };
+        // An event indicator without a list of dependencies depends on everything.
+        let indicators = indicators.map(|number| Unknown {
+            variable: positions[&table.indicator(number)],
+            dependencies: None,
+            kinds: Vec::new(),
+        });
+        let variables_of_table: Vec<_> = described.into_iter().map(|(_, variable)| variable).collect();
+        let info = &table.info;
+        Ok(ModelDescription {
+            standard: fmi,
+            version: if is_fmi3 { "3.0" } else { "2.0" }.to_owned(),
+            model_name: info.name.clone(),
+            token: NO_GUID.to_owned(),
+            about: info.about.clone(),
+            co_simulation: table.co_simulation.as_ref().map(|offer| self.co_simulation(offer)),
+            model_exchange: table.model_exchange.as_ref().map(|offer| self.model_exchange(offer)),
+            scheduled_execution: None,
+            default_experiment: [info.start_time, info.stop_time, info.step_size].map(Some),
+            default_tolerance: Some(info.tolerance),
+            outputs: unknowns(&structure.outputs),
+            derivatives: unknowns(&structure.derivatives),
+            initial_unknowns: unknowns(&structure.initial_unknowns),
+            event_indicators: Some(table.indicators()),
+            indicators: indicators.collect(),
+            log_categories: Category::ALL.map(log_category).to_vec(),
+            units: units(&variables_of_table)?,
+            types: self.types(&variables_of_table, &variables)?,
+            structured_names: table.arrays,
+            variables,
+            faults: Vec::new(),
+        })
     }
 
-    /// Returns the root element with the attributes of the model.
-    fn root(&self) -> Element {
-        let Self { table: Table { info, arrays, .. }, fmi, .. } = self;
-        let (version, guid) = match fmi {
-            Standard::Fmi2 => ("2.0", "guid"),
-            Standard::Fmi3 => ("3.0", "instantiationToken"),
+    /// The capabilities in Model Exchange (section 3.3.1 of FMI 2.0, 2.4.2 of FMI 3.0).
+    fn model_exchange(&self, offer: &ModelExchange) -> Offer {
+        self.offer(&match self.fmi {
+            Standard::Fmi2 => [("completedIntegratorStepNotNeeded", !offer.step_completed)],
+            Standard::Fmi3 => [("needsCompletedIntegratorStep", offer.step_completed)],
+        })
+    }
+
+    /// The capabilities in Co-Simulation (section 4.3.1 of FMI 2.0, 4.4 of FMI 3.0).
+    fn co_simulation(&self, offer: &CoSimulation) -> Offer {
+        let step_size = ("canHandleVariableCommunicationStepSize", offer.variable_step_size);
+        let flags = match self.fmi {
+            Standard::Fmi2 => vec![step_size, ("canInterpolateInputs", self.table.input_derivatives)],
+            Standard::Fmi3 => vec![
+                step_size,
+                ("providesIntermediateUpdate", false),
+                ("canReturnEarlyAfterIntermediateUpdate", false),
+                ("mightReturnEarlyFromDoStep", offer.ends_early),
+                ("hasEventMode", offer.event_mode),
+            ],
         };
-        let indicators = self.table.model_exchange.as_ref().map(|offer| offer.indicators);
-        // There is no generationDateAndTime, because with it every build would give a different file.
-        Element::new("fmiModelDescription")
-            .with("fmiVersion", version)
-            .with("modelName", &info.name)
-            .with(guid, NO_GUID)
-            .with_some("description", filled(&info.description))
-            .with_some("author", filled(&info.author))
-            .with_some("version", filled(&info.version))
-            .with_some("copyright", filled(&info.copyright))
-            .with_some("license", filled(&info.license))
-            .with("generationTool", concat!("fmu-package ", env!("CARGO_PKG_VERSION")))
-            .with("variableNamingConvention", if *arrays { "structured" } else { "flat" })
-            .with_some("numberOfEventIndicators", indicators.filter(|_| *fmi == Standard::Fmi2))
+        let mut offer = self.offer(&flags);
+        offer.max_output_derivative_order = Some(self.table.output_derivatives);
+        offer
     }
 
-    /// The element of Model Exchange (section 3.3.1 of FMI 2.0, 2.4.2 of FMI 3.0).
-    fn model_exchange(&self, offer: &ModelExchange) -> Element {
-        let element = self.interface("ModelExchange");
-        match self.fmi {
-            Standard::Fmi2 => self
-                .with_capabilities(element.with("completedIntegratorStepNotNeeded", !offer.step_completed)),
-            Standard::Fmi3 => {
-                self.with_capabilities(element).with("needsCompletedIntegratorStep", offer.step_completed)
-            }
+    /// The capabilities in an interface type: those given and those that are the same for both.
+    fn offer(&self, flags: &[(&'static str, bool)]) -> Offer {
+        let partials = self.table.partials;
+        let common = match self.fmi {
+            Standard::Fmi2 => [
+                ("canNotUseMemoryManagementFunctions", true),
+                ("canGetAndSetFMUstate", true),
+                ("canSerializeFMUstate", true),
+                ("providesDirectionalDerivative", partials),
+            ],
+            Standard::Fmi3 => [
+                ("canGetAndSetFMUState", true),
+                ("canSerializeFMUState", true),
+                ("providesDirectionalDerivatives", partials),
+                ("providesAdjointDerivatives", partials),
+            ],
+        };
+        let mut offer = Offer::new(self.fmi, &*self.table.info.identifier, &[flags, &common].concat());
+        if self.fmi == Standard::Fmi2 {
+            offer.source_files.clone_from(&self.changes.source_files);
         }
+        offer
     }
 
-    /// The element of Co-Simulation (section 4.3.1 of FMI 2.0, 4.4 of FMI 3.0).
-    fn co_simulation(&self, offer: &CoSimulation) -> Element {
-        let element = self.interface("CoSimulation");
-        let (step_size, order) = ("canHandleVariableCommunicationStepSize", "maxOutputDerivativeOrder");
-        match self.fmi {
-            Standard::Fmi2 => self.with_capabilities(
-                element
-                    .with(step_size, offer.variable_step_size)
-                    .with("canInterpolateInputs", self.table.input_derivatives)
-                    .with(order, self.table.output_derivatives),
-            ),
-            Standard::Fmi3 => self
-                .with_capabilities(element)
-                .with(step_size, offer.variable_step_size)
-                .with(order, self.table.output_derivatives)
-                .with("providesIntermediateUpdate", false)
-                .with("canReturnEarlyAfterIntermediateUpdate", false)
-                .with("mightReturnEarlyFromDoStep", offer.ends_early)
-                .with("hasEventMode", offer.event_mode),
-        }
-    }
-
-    fn interface(&self, name: &str) -> Element {
-        Element::new(name).with("modelIdentifier", &self.table.info.identifier)
-    }
-
-    /// Adds the capabilities that are the same for both interface types.
-    fn with_capabilities(&self, element: Element) -> Element {
-        let file = |name: &String| Element::new("File").with("name", name);
-        match self.fmi {
-            Standard::Fmi2 => element
-                .with("canNotUseMemoryManagementFunctions", true)
-                .with("canGetAndSetFMUstate", true)
-                .with("canSerializeFMUstate", true)
-                .with("providesDirectionalDerivative", self.table.partials)
-                .containing(list("SourceFiles", self.changes.source_files.iter().map(file))),
-            Standard::Fmi3 => element
-                .with("canGetAndSetFMUState", true)
-                .with("canSerializeFMUState", true)
-                .with("providesDirectionalDerivatives", self.table.partials)
-                .with("providesAdjointDerivatives", self.table.partials),
-        }
-    }
-
-    /// Returns the name of the XML element for a base type.
-    fn name_of_type(&self, base: BaseType) -> String {
-        match (base, self.fmi) {
-            (BaseType::Real, Standard::Fmi3) => "Float64".to_owned(),
-            (BaseType::Integer, Standard::Fmi3) => "Int32".to_owned(),
-            _ => base.to_string(),
-        }
-    }
-
-    fn type_definition(&self, definition: &Type) -> Element {
-        let (element, name) = (self.name_of_type(definition.base), &definition.name);
-        match self.fmi {
-            Standard::Fmi2 => {
-                let element = with_attributes(Element::new(element), definition);
-                Element::new("SimpleType")
-                    .with("name", name)
-                    .containing([element.containing(items(definition))])
-            }
-            Standard::Fmi3 => {
-                let element = Element::new(format!("{element}Type")).with("name", name);
-                // FMPy 0.3 rejects a BinaryType with more attributes, so the variables have them instead.
-                let has_attributes = definition.base != BaseType::Binary;
-                let element = if has_attributes { with_attributes(element, definition) } else { element };
-                element.containing(items(definition))
-            }
-        }
-    }
-
-    /// Returns the name of a variable. For an element of an array, this is the name of the whole array in FMI 3.0.
-    fn name<'v>(&self, variable: &'v Variable) -> &'v str {
-        if self.fmi == Standard::Fmi2 { &variable.name } else { &variable.name_of_array }
-    }
-
-    /// Returns the XML element of a variable. In FMI 3.0, the first element of an array gives the XML element of the whole array, with
-    /// the start values of all elements.
-    fn variable(&self, index: u32, variable: &Variable, starts: &[Option<Value>]) -> Element {
-        let Self { table, fmi, changes } = self;
+    /// Returns a variable of the description. In FMI 3.0, the first element of an array gives the whole array, with the start values of
+    /// all elements.
+    fn variable(
+        &self,
+        index: u32,
+        of: &Variable,
+        starts: &[Option<Value>],
+        positions: &IndexMap<u32, usize>,
+    ) -> description::Variable {
         // A parameter that is calculated from tunable parameters is tunable.
-        let variability = match variable.causality {
-            Causality::Parameter | Causality::CalculatedParameter if changes.tunable_parameters => {
+        let variability = match of.causality {
+            Causality::Parameter | Causality::CalculatedParameter if self.changes.tunable_parameters => {
                 Variability::Tunable
             }
-            _ => variable.variability,
+            _ => of.variability,
         };
-        let with_common_attributes = |name: String| {
-            Element::new(name)
-                .with("name", self.name(variable))
-                .with("valueReference", fmi.reference(index))
-                .with_some("description", filled(&variable.description))
-                .with("causality", variable.causality)
-                .with("variability", variability)
-                .with_some("initial", variable.initial)
+        let (name, shape) = match self.fmi {
+            Standard::Fmi2 => (&of.name, Vec::new()),
+            Standard::Fmi3 => (&of.name_of_array, of.shape.clone()),
         };
-        // Only importers that integrate need to know whether events may change the variable.
-        let reinit = (table.model_exchange.is_some() && variable.reinit).then_some(true);
-        let with_value = |element: Element, start: Option<String>| {
-            element
-                .with_some("declaredType", filled(&variable.variable_type.name))
-                .with_some("start", start)
-                .with_some("derivative", variable.differentiates.map(position))
-                .with_some("reinit", reinit)
-        };
-        let name = self.name_of_type(variable.base());
-        let count = if *fmi == Standard::Fmi2 { 1 } else { variable.length() };
-        let starts = starts[index as usize..][..count].iter().flatten();
-        if *fmi == Standard::Fmi2 {
-            // Many importers do not look types up, so the attributes of the type are repeated.
-            let value = with_value(Element::new(name), starts.map(Value::to_string).next());
-            return with_common_attributes("ScalarVariable".to_owned())
-                .containing([with_attributes(value, &variable.variable_type)]);
-        }
-        let starts = starts.map(|start| match start {
+        let size = shape.iter().product();
+        let start = starts[index as usize..][..size].iter().flatten().map(|start| match start {
             // Writes as few digits as single precision needs.
-            Value::Real(value) if variable.base() == BaseType::Float32 => (*value as f32).to_string(),
+            Value::Real(value) if of.base == BaseType::Float32 => (*value as f32).to_string(),
             other => other.to_string(),
         });
-        let is_element = matches!(variable.base(), BaseType::String | BaseType::Binary);
-        let (children, list): (Vec<_>, Vec<_>) = starts.partition(|_| is_element);
-        let element = with_value(with_common_attributes(name), (!list.is_empty()).then(|| list.join(" ")));
-        // Only the range of the type is repeated: fmi-sim 0.7 rejects an FMU in which a variable with a declared type also has
-        // a quantity, a unit or a nominal value, although section 2.4.7.3 of FMI 3.0 allows that.
-        let with = if variable.variable_type.name.is_empty() { with_attributes } else { with_range };
-        with(element, &variable.variable_type)
-            .containing(variable.dimensions.iter().map(|size| Element::new("Dimension").with("start", size)))
-            .containing(children.into_iter().map(|start| Element::new("Start").with("value", start)))
+        description::Variable {
+            name: name.clone(),
+            reference: self.fmi.reference(index),
+            variability,
+            start: start.collect(),
+            dimensions: Some(shape),
+            size: Some(size),
+            derivative_of: of.derivative_of.map(|state| positions[&(state as u32)]),
+            // Only importers that integrate need to know whether events may change the variable.
+            reinit: of.reinit && self.table.model_exchange.is_some(),
+            ..of.described.clone()
+        }
     }
 
-    /// Returns the variables that FMI 3.0 requires in addition to the table: an independent variable (section 2.4.7.4 of FMI 3.0), and a
-    /// variable for each event indicator (section 2.4.8).
-    fn generated(&self) -> Vec<Element> {
+    /// Returns the declared types, in the order of their first use.
+    ///
+    /// # Errors
+    /// When two different types share a name, or a type and a variable do.
+    fn types(
+        &self,
+        of_table: &[&Variable],
+        variables: &[description::Variable],
+    ) -> Result<IndexMap<String, Type>> {
+        let mut types: IndexMap<String, (Type, Option<&Unit>)> = IndexMap::new();
+        for of in of_table {
+            let Some(name) = &of.declared_type else { continue };
+            ensure!(
+                !variables.iter().any(|variable| variable.name == *name),
+                "{name} is a variable and a type; rename one of them (section 2.2.3 of FMI 2.0)"
+            );
+            let attributes = match of.base {
+                // FMPy 0.3 rejects a BinaryType with attributes, so only the variables have them.
+                BaseType::Binary => Attributes::default(),
+                _ => of.attributes.clone(),
+            };
+            let declared =
+                Type { base: Some(of.base), attributes, items: of.items.clone(), description: String::new() };
+            match types.entry(name.clone()) {
+                Entry::Occupied(known) => ensure!(
+                    *known.get() == (declared, of.unit.as_ref()),
+                    "there are two different types with the name {name}"
+                ),
+                Entry::Vacant(place) => {
+                    place.insert((declared, of.unit.as_ref()));
+                }
+            }
+        }
+        Ok(types.into_iter().map(|(name, (declared, _))| (name, declared)).collect())
+    }
+
+    /// Returns the variables that FMI 3.0 requires in addition to the table, each with its index: an independent variable (section 2.4.7.4
+    /// of FMI 3.0), and a variable for each event indicator (section 2.4.8).
+    fn generated(&self) -> Vec<(u32, description::Variable)> {
         let table = self.table;
         if self.fmi == Standard::Fmi2 {
             return Vec::new();
         }
-        let variable = |name: String, index: u32, description: &str, causality: &str| {
-            Element::new("Float64")
-                .with("name", name)
-                .with("valueReference", self.fmi.reference(index))
-                .with("description", description)
-                .with("causality", causality)
-                .with("variability", "continuous")
-        };
         let time = Some(table.time()).filter(|time| table.variable(*time).is_none());
-        let time = time.map(|time| variable("time".to_owned(), time, "Simulation time", "independent"));
+        let time = time.map(|index| {
+            let name = "time".to_owned();
+            (index, generated(self.fmi.reference(index), name, "Simulation time", Causality::Independent))
+        });
         let indicator = |number: usize| {
+            let index = table.indicator(number);
             let name = format!("eventIndicator[{}]", number + 1);
             let description = "An event happens where it changes its sign";
-            variable(name, table.indicator(number), description, "local").with("initial", "calculated")
+            (index, generated(self.fmi.reference(index), name, description, Causality::Local))
         };
         time.into_iter().chain((0..table.indicators()).map(indicator)).collect()
     }
+}
 
-    fn structure(&self, structure: &ModelStructure) -> Element {
-        let lists = [&structure.outputs, &structure.derivatives, &structure.initial_unknowns];
-        let element = Element::new("ModelStructure");
-        if self.fmi == Standard::Fmi2 {
-            let lists = ["Outputs", "Derivatives", "InitialUnknowns"].into_iter().zip(lists);
-            return element.containing(lists.filter_map(|(name, unknowns)| {
-                list(name, unknowns.iter().map(|unknown| with_dependencies("Unknown", "index", unknown)))
-            }));
-        }
-        let lists = ["Output", "ContinuousStateDerivative", "InitialUnknown"].into_iter().zip(lists);
-        let unknowns = lists.flat_map(|(name, unknowns)| {
-            unknowns.iter().map(move |unknown| with_dependencies(name, "valueReference", unknown))
-        });
-        // An event indicator without a list of dependencies depends on everything.
-        let indicator = |number| {
-            Element::new("EventIndicator").with("valueReference", position(self.table.indicator(number)))
-        };
-        element.containing(unknowns).containing((0..self.table.indicators()).map(indicator))
+/// Returns a continuous variable, which is calculated unless it is independent.
+fn generated(reference: u32, name: String, description: &str, causality: Causality) -> description::Variable {
+    description::Variable {
+        initial: (causality != Causality::Independent).then_some(Initial::Calculated),
+        description: description.to_owned(),
+        ..description::Variable::scalar(name, reference, BaseType::Real, causality, Variability::Continuous)
     }
 }
 
-/// Returns the XML element of an unknown. Empty lists state that it depends on nothing; without a list it would depend on everything.
-fn with_dependencies(name: &str, reference: &str, unknown: &Unknown) -> Element {
-    let (known, kinds): (Vec<_>, Vec<_>) = unknown
-        .dependencies
-        .iter()
-        .map(|(known, kind)| (position(*known).to_string(), kind.to_string()))
-        .unzip();
-    Element::new(name)
-        .with(reference, position(unknown.index))
-        .with("dependencies", known.join(" "))
-        .with("dependenciesKind", kinds.join(" "))
+/// Returns the units, in the order of their first use.
+///
+/// # Errors
+/// When two different units share a name.
+fn units(variables: &[&Variable]) -> Result<IndexMap<String, Unit>> {
+    let mut units: IndexMap<String, Unit> = IndexMap::new();
+    for of in variables {
+        let (Some(name), Some(unit)) = (&of.attributes.unit, &of.unit) else { continue };
+        match units.entry(name.to_string()) {
+            Entry::Occupied(known) => {
+                ensure!(known.get() == unit, "there are two different units with the name {name}");
+            }
+            Entry::Vacant(place) => {
+                place.insert(unit.clone());
+            }
+        }
+    }
+    Ok(units)
 }
 
-fn log_category(category: Category) -> Element {
-    Element::new("Category")
-        .with("name", category.name().to_string_lossy())
-        .with("description", category.description())
+/// Returns an unknown of the description.
+fn unknown(of: &structure::Unknown, positions: &IndexMap<u32, usize>) -> Unknown {
+    let (known, kinds) = of.dependencies.iter().map(|(known, kind)| (positions[known], *kind)).unzip();
+    Unknown { variable: positions[&of.index], dependencies: Some(known), kinds }
 }
 
-fn default_experiment(table: &Table) -> Element {
-    Element::new("DefaultExperiment")
-        .with("startTime", table.info.start_time)
-        .with("stopTime", table.info.stop_time)
-        .with("tolerance", table.info.tolerance)
-        .with("stepSize", table.info.step_size)
+fn log_category(category: Category) -> LogCategory {
+    LogCategory {
+        name: category.name().to_string_lossy().into_owned(),
+        description: category.description().to_owned(),
+    }
 }

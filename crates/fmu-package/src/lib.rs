@@ -28,7 +28,6 @@ mod command;
 mod connectors;
 mod content;
 mod cross;
-mod definitions;
 mod describe;
 mod directory;
 mod fingerprint;

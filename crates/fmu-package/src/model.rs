@@ -142,7 +142,7 @@ impl LoadedModel {
         monitor: Arc<CallMonitor>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
-        let group = |base| Group { base, indices: table.find(|variable| variable.base() == base) };
+        let group = |base| Group { base, indices: table.find(|variable| variable.base == base) };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.indices.is_empty()).collect();
         Ok(Self {
             table,

@@ -3,7 +3,7 @@
 use crate::check::{Starts, rounded};
 use crate::instance::{Instance, Outcome};
 use crate::model::LoadedModel;
-use crate::table::{Attributes, Type, Variable};
+use crate::table::Variable;
 use anyhow::{Result, anyhow};
 use fmi_abi::{Causality, Interface, Standard, Value, Variability};
 use std::collections::BTreeMap;
@@ -208,12 +208,11 @@ impl<'a> Sampler<'a> {
                 share = 2.0 * self.random.f64() - 1.0;
             }
             let around = match reach.common > 0.0 && variable.length() > 1 && is_array() {
-                true => &moved_in_common(&variable.variable_type, around, share * reach.common),
+                true => &moved_in_common(variable, around, share * reach.common),
                 false => around,
             };
             let value = &mut point.values[index];
-            *value =
-                draw_value(&mut self.random, &variable.variable_type, around, value.as_ref(), reach.single);
+            *value = draw_value(&mut self.random, variable, around, value.as_ref(), reach.single);
         }
     }
 
@@ -308,10 +307,10 @@ pub(crate) fn is_finite(value: &Value) -> bool {
 
 /// Changes an element of an array together with the others: `share`, which is the same for all elements, gives the factor of a Real, or
 /// the number that is added to an integer.
-fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
-    match (&variable_type.attributes, value) {
-        (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),
-        (Attributes::Integer { .. }, &Value::Integer(value)) => {
+fn moved_in_common(variable: &Variable, value: &Value, share: f64) -> Value {
+    match value {
+        Value::Real(value) => Value::Real(value * (1.0 + 0.5 * share)),
+        Value::Integer(value) if variable.range().is_some() => {
             Value::Integer(value.saturating_add((3.0 * share).round() as i128))
         }
         _ => value.clone(),
@@ -322,27 +321,27 @@ fn moved_in_common(variable_type: &Type, value: &Value, share: f64) -> Value {
 /// or Boolean differs from the previous value if possible. Returns `None` for strings and binary values.
 pub(crate) fn draw_value(
     random: &mut fastrand::Rng,
-    variable_type: &Type,
+    variable: &Variable,
     start: &Value,
     before: Option<&Value>,
     part: f64,
 ) -> Option<Value> {
-    Some(match (&variable_type.attributes, start) {
-        (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
-            let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };
+    Some(match (start, variable.range()) {
+        (Value::Real(start), _) => {
+            let nominal = variable.attributes.nominal.unwrap_or(1.0);
+            let reach = if *start == 0.0 { nominal } else { 0.5 * start.abs() };
             let value = start + part * reach * (2.0 * random.f64() - 1.0);
-            let value = value.clamp(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX));
-            Value::Real(rounded(variable_type.base, value))
+            let value = value.clamp(variable.min().unwrap_or(f64::MIN), variable.max().unwrap_or(f64::MAX));
+            Value::Real(rounded(variable.base, value))
         }
-        (Attributes::Integer { min, max }, &Value::Integer(start)) => {
+        (Value::Integer(start), Some((min, max))) => {
             let reach = (3.0 * part).ceil() as i128;
-            let start = start.clamp(*min, *max);
-            let (low, high) =
-                (*min.max(&start.saturating_sub(reach)), *max.min(&start.saturating_add(reach)));
+            let start = (*start).clamp(min, max);
+            let (low, high) = (min.max(start.saturating_sub(reach)), max.min(start.saturating_add(reach)));
             Value::Integer(random.i128(low..=high))
         }
-        (Attributes::Enumeration(items), _) => {
-            let values = items.iter().map(|item| Value::Integer(item.value.into()));
+        (Value::Integer(_), None) => {
+            let values = variable.items.iter().map(|item| Value::Integer(item.value.into()));
             let others: Vec<Value> = values.filter(|value| Some(value) != before).collect();
             return if others.is_empty() {
                 before.cloned()
@@ -350,10 +349,10 @@ pub(crate) fn draw_value(
                 Some(others[random.usize(..others.len())].clone())
             };
         }
-        (Attributes::Other, Value::Boolean(_)) => match before {
+        (Value::Boolean(_), _) => match before {
             Some(Value::Boolean(before)) => Value::Boolean(!before),
             _ => Value::Boolean(random.bool()),
         },
-        _ => return None,
+        (Value::String(_) | Value::Binary(_), _) => return None,
     })
 }

@@ -23,8 +23,8 @@ pub(crate) fn indexed_starts(table: &Table, starts: &[(String, String)]) -> Resu
         let (index, variable) = found.with_context(|| format!("there is no variable {name}"))?;
         let is_settable = variable.has_start() && variable.variability != Variability::Constant;
         ensure!(is_settable, "{name} has no start value that can be changed");
-        let value = Value::read(variable.base(), text)
-            .with_context(|| format!("{name} is {}, {text:?} is not such a value", variable.base()))?;
+        let value = Value::read(variable.base, text)
+            .with_context(|| format!("{name} is {}, {text:?} is not such a value", variable.base))?;
         if compiled.get(index as usize) == Some(&Some(value.clone())) {
             continue;
         }

@@ -163,7 +163,7 @@ fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknow
     }
     // Strings and bytes are not changed in the evaluations.
     let is_tried = |index: u32| {
-        table.variable(index).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
+        table.variable(index).is_none_or(|known| !matches!(known.base, BaseType::String | BaseType::Binary))
     };
     let kinds: HashMap<u32, DependencyKind> = found.dependencies.iter().copied().collect();
     let smooth = table.info.smooth;
@@ -185,8 +185,7 @@ fn found(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<
     if list.is_empty() || !table.info.smooth {
         return Ok(list);
     }
-    let is_real =
-        |index: u32| table.variable(index).is_some_and(|variable| variable.base() == BaseType::Real);
+    let is_real = |index: u32| table.variable(index).is_some_and(|variable| variable.base == BaseType::Real);
     let reals: Vec<u32> = unknowns.iter().copied().filter(|index| is_real(*index)).collect();
     // During initialization, the kinds `fixed` and `tunable` are not allowed.
     let with_partials = table.partials && sampler.running;

@@ -1,9 +1,12 @@
 //! Reads the description of a model that its library returns: general information, the variables and their start values.
 
 use anyhow::{Context, Result, anyhow, ensure};
-use fmi_abi::{BaseType, BaseUnit, Causality, DisplayUnit, Initial, Interface, Value, Variability};
+use fmi_abi::description::{self, About, Attributes, Item};
+use fmi_abi::{BaseType, BaseUnit, Causality, DisplayUnit, Initial, Interface, Unit, Value, Variability};
 use serde_json::Value as Json;
+use std::ops::Deref;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// The version of the description's format that is read here.
 const VERSION: u64 = 1;
@@ -34,11 +37,7 @@ pub(crate) struct Info {
     pub name: String,
     pub identifier: String,
     pub guid: String,
-    pub description: String,
-    pub author: String,
-    pub version: String,
-    pub license: String,
-    pub copyright: String,
+    pub about: About,
     pub start_time: f64,
     pub stop_time: f64,
     pub step_size: f64,
@@ -59,58 +58,35 @@ pub(crate) struct ModelExchange {
     pub step_completed: bool,
 }
 
-/// A variable, or an element of an array.
+/// A variable, or an element of an array, with what only the build needs of it.
 #[derive(Debug)]
 pub(crate) struct Variable {
-    /// The name; the name of an element of an array has its indices.
-    pub name: String,
+    /// The variable in FMI 2.0, where each element of an array is one. It has no start value yet.
+    pub described: description::Variable,
+    pub base: BaseType,
     /// The name without indices.
     pub name_of_array: String,
-    pub dimensions: Vec<usize>,
+    /// The sizes of its array; empty for a scalar.
+    pub shape: Vec<usize>,
     /// The number of the element, counted from 0, row by row.
     pub element: usize,
-    pub description: String,
-    pub causality: Causality,
-    pub variability: Variability,
-    pub initial: Option<Initial>,
-    pub variable_type: Type,
-    /// The index of the variable whose derivative this is.
-    pub differentiates: Option<u32>,
+    /// The items of its enumeration.
+    pub items: Vec<Item>,
+    /// The definition of its unit.
+    pub unit: Option<Unit>,
     /// The indices of the variables that it depends on, if the model declares them.
     pub dependencies: Option<Vec<u32>>,
     pub depends_on_time: bool,
     pub state: bool,
-    pub reinit: bool,
 }
 
-#[derive(Debug, PartialEq)]
-pub(crate) struct Type {
-    pub name: String,
-    pub base: BaseType,
-    pub attributes: Attributes,
-}
+/// Gives access to what the description contains.
+impl Deref for Variable {
+    type Target = description::Variable;
 
-#[derive(Debug, PartialEq)]
-pub(crate) enum Attributes {
-    Real { quantity: String, unit: Unit, min: Option<f64>, max: Option<f64>, nominal: Option<f64> },
-    Integer { min: i128, max: i128 },
-    Binary { mime_type: String, max_size: usize },
-    Enumeration(Vec<Item>),
-    Other,
-}
-
-#[derive(Debug, PartialEq)]
-pub(crate) struct Item {
-    pub name: String,
-    pub value: i32,
-    pub description: String,
-}
-
-#[derive(Debug, PartialEq)]
-pub(crate) struct Unit {
-    pub name: String,
-    pub base: BaseUnit,
-    pub display: Option<DisplayUnit>,
+    fn deref(&self) -> &description::Variable {
+        &self.described
+    }
 }
 
 /// The start values of a new model.
@@ -135,7 +111,9 @@ impl Table {
             "its version of fmu-export differs from the version of fmu-package, {}",
             env!("CARGO_PKG_VERSION")
         );
-        let variables: Vec<_> = list(&json, "variables", variable)?;
+        let variables = json["variables"].as_array().with_context(lacks("variables"))?.iter().enumerate();
+        let variables: Vec<_> =
+            variables.map(|(index, json)| variable(index, json)).collect::<Result<_>>()?;
         let starts = list(&json, "starts", |json| start(json, &variables))?;
         let mut table = Self {
             info: info(&json)?,
@@ -212,13 +190,19 @@ impl Table {
 }
 
 impl Variable {
-    pub fn base(&self) -> BaseType {
-        self.variable_type.base
-    }
-
     /// The number of elements of its array; 1 for a scalar.
     pub fn length(&self) -> usize {
-        self.dimensions.iter().product()
+        self.shape.iter().product()
+    }
+
+    /// The smallest and the largest integer that the model allows; `None` for a variable that is no integer.
+    pub fn range(&self) -> Option<(i128, i128)> {
+        let limit = |limit: &Option<Value>, default| match limit {
+            Some(Value::Integer(limit)) => *limit,
+            _ => default,
+        };
+        let (min, max) = self.base.range()?;
+        Some((limit(&self.attributes.min, min), limit(&self.attributes.max, max)))
     }
 
     /// Whether it has a start value: inputs, and variables whose `initial` is exact or approx (section 2.2.7 of FMI 2.0).
@@ -243,26 +227,19 @@ impl Variable {
     }
 }
 
-impl Type {
-    /// The unit of a Real.
-    pub fn unit(&self) -> Option<&Unit> {
-        match &self.attributes {
-            Attributes::Real { unit, .. } => Some(unit),
-            _ => None,
-        }
-    }
-}
-
 fn info(json: &Json) -> Result<Info> {
     Ok(Info {
         name: text(json, "name")?,
         identifier: text(json, "identifier")?,
         guid: text(json, "guid")?,
-        description: text(json, "description")?,
-        author: text(json, "author")?,
-        version: text(json, "modelVersion")?,
-        license: text(json, "license")?,
-        copyright: text(json, "copyright")?,
+        about: About {
+            description: text(json, "description")?,
+            author: text(json, "author")?,
+            version: text(json, "modelVersion")?,
+            license: text(json, "license")?,
+            copyright: text(json, "copyright")?,
+            generation_tool: concat!("fmu-package ", env!("CARGO_PKG_VERSION")).to_owned(),
+        },
         start_time: number(json, "startTime")?,
         stop_time: number(json, "stopTime")?,
         step_size: number(json, "stepSize")?,
@@ -271,55 +248,79 @@ fn info(json: &Json) -> Result<Info> {
     })
 }
 
-fn variable(json: &Json) -> Result<Variable> {
+/// Reads the variable at this index.
+fn variable(index: usize, json: &Json) -> Result<Variable> {
     let initial = json["initial"].as_str().map(|name| Initial::of_name(name).with_context(lacks("initial")));
-    Ok(Variable {
-        name: text(json, "name")?,
-        name_of_array: text(json, "array")?,
-        dimensions: list(json, "dimensions", count)?,
-        element: count(&json["element"])?,
-        description: text(json, "description")?,
-        causality: Causality::of_name(&text(json, "causality")?).with_context(lacks("causality"))?,
-        variability: Variability::of_name(&text(json, "variability")?).with_context(lacks("variability"))?,
+    let of_type = &json["type"];
+    let base = text(of_type, "base")?;
+    let base =
+        BaseType::ALL.into_iter().find(|known| known.to_string() == base).with_context(lacks("base"))?;
+    let causality = Causality::of_name(&text(json, "causality")?).with_context(lacks("causality"))?;
+    let variability = Variability::of_name(&text(json, "variability")?).with_context(lacks("variability"))?;
+    let scalar = description::Variable::scalar(
+        text(json, "name")?,
+        u32::try_from(index)?,
+        base,
+        causality,
+        variability,
+    );
+    let described = description::Variable {
         initial: initial.transpose()?,
-        variable_type: variable_type(&json["type"])?,
-        differentiates: some(json, "differentiates", count)?,
+        attributes: attributes(base, of_type)?,
+        declared_type: Some(text(of_type, "name")?).filter(|name| !name.is_empty()),
+        derivative_of: some(json, "differentiates", count)?,
+        reinit: flag(json, "reinit")?,
+        description: text(json, "description")?,
+        ..scalar
+    };
+    Ok(Variable {
+        described,
+        base,
+        name_of_array: text(json, "array")?,
+        shape: list(json, "dimensions", count)?,
+        element: count(&json["element"])?,
+        items: of_type["items"]
+            .is_array()
+            .then(|| list(of_type, "items", item))
+            .transpose()?
+            .unwrap_or_default(),
+        unit: some(of_type, "unit", unit)?,
         dependencies: match json["dependencies"].is_null() {
             true => None,
             false => Some(list(json, "dependencies", count)?),
         },
         depends_on_time: json["dependsOnTime"] == true,
         state: flag(json, "state")?,
-        reinit: flag(json, "reinit")?,
     })
 }
 
-fn variable_type(json: &Json) -> Result<Type> {
-    let base = text(json, "base")?;
-    let base = BaseType::ALL.into_iter().find(|known| known.to_string() == base);
-    let limit = |name| json[name].is_string().then(|| number(json, name)).transpose();
-    let attributes = if json["unit"].is_object() {
-        Attributes::Real {
-            quantity: text(json, "quantity")?,
-            unit: unit(&json["unit"])?,
-            min: limit("min")?,
-            max: limit("max")?,
-            nominal: limit("nominal")?,
-        }
-    } else if json["smallest"].is_string() {
-        Attributes::Integer { min: number(json, "smallest")?, max: number(json, "largest")? }
-    } else if json["mimeType"].is_string() {
-        Attributes::Binary { mime_type: text(json, "mimeType")?, max_size: count(&json["maxSize"])? }
-    } else if json["items"].is_array() {
-        Attributes::Enumeration(list(json, "items", |item| {
-            let value = item["value"].as_i64().and_then(|value| value.try_into().ok());
-            let value = value.with_context(lacks("value"))?;
-            Ok(Item { name: text(item, "name")?, value, description: text(item, "description")? })
-        })?)
-    } else {
-        Attributes::Other
+fn item(json: &Json) -> Result<Item> {
+    let value = json["value"].as_i64().with_context(lacks("value"))?;
+    Ok(Item { name: text(json, "name")?, value, description: text(json, "description")? })
+}
+
+/// Reads the attributes of a type. A limit that is the smallest or the largest value of an integer type anyway is no limit.
+fn attributes(base: BaseType, json: &Json) -> Result<Attributes> {
+    let filled = |name: &str| match json[name].is_null() {
+        true => Ok(None),
+        false => anyhow::Ok(Some(Arc::from(text(json, name)?)).filter(|text: &Arc<str>| !text.is_empty())),
     };
-    Ok(Type { name: text(json, "name")?, base: base.with_context(lacks("base"))?, attributes })
+    let real = |name| some(json, name, |_| number(json, name)).map(|limit| limit.map(Value::Real));
+    let integer = |name| some(json, name, |_| number(json, name));
+    let (smallest, largest) = base.range().unzip();
+    let [min, max] = [integer("smallest")?, integer("largest")?];
+    let unit = &json["unit"];
+    Ok(Attributes {
+        quantity: filled("quantity")?,
+        unit: some(json, "unit", |unit| Ok(Arc::from(text(unit, "name")?)))?,
+        display_unit: some(unit, "display", |display| Ok(Arc::from(text(display, "name")?)))?,
+        is_relative: false,
+        min: real("min")?.or(min.filter(|_| min != smallest).map(Value::Integer)),
+        max: real("max")?.or(max.filter(|_| max != largest).map(Value::Integer)),
+        nominal: some(json, "nominal", |_| number(json, "nominal"))?,
+        mime_type: some(json, "mimeType", |_| Ok(Arc::from(text(json, "mimeType")?)))?,
+        max_size: some(json, "maxSize", count)?,
+    })
 }
 
 fn unit(json: &Json) -> Result<Unit> {
@@ -332,15 +333,12 @@ fn unit(json: &Json) -> Result<Unit> {
     };
     let exponent = |json: &Json| json.as_i64().and_then(|exponent| exponent.try_into().ok());
     let exponents = list(json, "exponents", |json| exponent(json).with_context(lacks("exponents")))?;
-    Ok(Unit {
-        name: text(json, "name")?,
-        base: BaseUnit {
-            exponents: exponents.try_into().ok().with_context(lacks("exponents"))?,
-            factor: number(json, "factor")?,
-            offset: number(json, "offset")?,
-        },
-        display: some(json, "display", display)?,
-    })
+    let base = BaseUnit {
+        exponents: exponents.try_into().ok().with_context(lacks("exponents"))?,
+        factor: number(json, "factor")?,
+        offset: number(json, "offset")?,
+    };
+    Ok(Unit { base: Some(base), display_units: Vec::from_iter(some(json, "display", display)?) })
 }
 
 fn start(json: &Json, variables: &[Variable]) -> Result<Start> {
@@ -352,7 +350,7 @@ fn start(json: &Json, variables: &[Variable]) -> Result<Start> {
         return Ok(Start::Unreadable(index));
     }
     let value = |(variable, json): (&Variable, &Json)| {
-        let read = |text| Value::read(variable.base(), text).with_context(lacks("values"));
+        let read = |text| Value::read(variable.base, text).with_context(lacks("values"));
         json.as_str().map(read).transpose()
     };
     Ok(Start::Values {

@@ -4,7 +4,7 @@ use crate::arrays::{Array, Arrays};
 use crate::change::Change;
 use crate::index::Index;
 use fmi_abi::client::VariableNames;
-use fmi_abi::description::{Fault, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
+use fmi_abi::description::{Fault, Item, MAX_VALUES, ModelDescription, Unknown, Variable as Declared};
 use fmi_abi::{BaseType, BaseUnit, Causality, Value, Variability};
 use std::ops::{Deref, Range};
 use std::sync::Arc;
@@ -154,7 +154,7 @@ impl Description {
         };
         let written = ModelDescription::parse_configured(text, &structure.iter().filter_map(size).collect())?;
         if written.co_simulation.is_none() && written.model_exchange.is_none() {
-            let why = if written.scheduled_execution {
+            let why = if written.scheduled_execution.is_some() {
                 "it has only Scheduled Execution, which is not supported here; FMPy supports it with its class FMU3ScheduledExecution"
             } else {
                 "it has neither Co-Simulation nor Model Exchange"
@@ -279,8 +279,8 @@ impl Description {
     }
 
     /// Returns the names and numbers of the items of a variable's enumeration, if it has one.
-    pub fn items(&self, of: &Variable) -> Option<&[(String, i64)]> {
-        self.enumerations.get(of.declared_type.as_deref()?).map(Vec::as_slice)
+    pub fn items(&self, of: &Variable) -> Option<&[Item]> {
+        self.items_of(of.declared_type.as_deref())
     }
 
     /// Checks that an output may be connected to an input of this or another FMU. Both must have the same [kind](Variable::kind),
@@ -324,7 +324,7 @@ impl Description {
     /// Fails if the variables have enumerations with different items.
     fn check_items(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
         match (self.items(output), to.items(input)) {
-            (Some(one), Some(other)) if one != other => {
+            (Some(one), Some(other)) if !Item::are_same(one, other) => {
                 Err("their enumerations have different items".to_owned())
             }
             _ => Ok(()),
@@ -449,12 +449,12 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         base,
         causality: of.causality,
         variability: of.has_variability.then_some(of.variability),
-        unit: given(&of.unit),
-        min: of.min,
-        max: of.max,
+        unit: given(&of.attributes.unit),
+        min: of.min(),
+        max: of.max(),
         declared_type: of.declared_type.clone(),
-        display_unit: given(&of.display_unit),
-        is_relative: of.is_relative,
+        display_unit: given(&of.attributes.display_unit),
+        is_relative: of.attributes.is_relative,
         depends_on: None,
         clocks: of.clocks.clone(),
         description: of.description.clone(),

@@ -202,8 +202,8 @@ pub(crate) fn number_of(found: Found, name: &str, value: &Value) -> Result<f64, 
     let Some(items) = found.description.items(found.variable) else {
         return request(format!("{name} is {}, its start value cannot be {text:?}", kind()));
     };
-    let number = items.iter().find(|(item, _)| item == text).map(|(_, number)| *number as f64);
-    let known = || items.iter().map(|(item, _)| item.as_str()).collect::<Vec<_>>().join(", ");
+    let number = items.iter().find(|item| item.name == *text).map(|item| item.value as f64);
+    let known = || items.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
     number.ok_or_else(|| {
         Error::Request(format!("{name} is one of {}, its start value cannot be {text:?}", known()))
     })

@@ -1,17 +1,21 @@
 //! Reads model descriptions, and accepts faulty ones as far as possible: missing attributes get the defaults of the FMI
 //! standard or stay empty, and each [`Fault`] is listed. An attribute whose value cannot be read is such a fault.
 
+mod attributes;
 mod clock;
 mod faults;
 mod offer;
 mod read;
 mod variable;
+#[cfg(feature = "write")]
+mod write;
 
 use crate::{DependencyKind, Interface, Standard, Unit};
+pub use attributes::{Attributes, Item, Type};
 pub use clock::{Clock, Timing};
 pub use faults::Fault;
+use indexmap::IndexMap;
 pub use offer::Offer;
-use std::collections::{BTreeMap, BTreeSet};
 pub use variable::{Alias, Variable};
 
 /// Maximum number of values in all arrays together. The size of an array that would exceed it counts as unknown.
@@ -28,6 +32,32 @@ pub struct Unknown {
     pub kinds: Vec<DependencyKind>,
 }
 
+/// Author, version and other facts about a model; each is empty if it is missing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Description of the model.
+    pub description: String,
+    /// Author of the model.
+    pub author: String,
+    /// Version of the model.
+    pub version: String,
+    /// Copyright of the model.
+    pub copyright: String,
+    /// License of the model.
+    pub license: String,
+    /// Program that made the FMU (`generationTool`).
+    pub generation_tool: String,
+}
+
+/// A category of log messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogCategory {
+    /// Name.
+    pub name: String,
+    /// Description; empty if missing.
+    pub description: String,
+}
+
 /// Content of a model description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelDescription {
@@ -39,12 +69,14 @@ pub struct ModelDescription {
     pub model_name: String,
     /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
     pub token: String,
+    /// What the description says of the model to people.
+    pub about: About,
     /// Capabilities in Co-Simulation, if the FMU supports it.
     pub co_simulation: Option<Offer>,
     /// Capabilities in Model Exchange, if the FMU supports it.
     pub model_exchange: Option<Offer>,
-    /// Whether the FMU supports Scheduled Execution.
-    pub scheduled_execution: bool,
+    /// Capabilities in Scheduled Execution, if the FMU supports it.
+    pub scheduled_execution: Option<Offer>,
     /// Start time, stop time and step size of the default experiment, s, if given.
     pub default_experiment: [Option<f64>; 3],
     /// Relative tolerance of the default experiment, if given.
@@ -59,14 +91,14 @@ pub struct ModelDescription {
     pub initial_unknowns: Vec<Unknown>,
     /// Number of event indicators; `None` if it is unknown.
     pub event_indicators: Option<usize>,
-    /// Names of the log categories.
-    pub log_categories: Vec<String>,
-    /// Units by name.
-    pub units: BTreeMap<String, Unit>,
-    /// Names of the declared types.
-    pub types: BTreeSet<String>,
-    /// Name and number of each item of an enumeration, by the name of the enumeration's type.
-    pub enumerations: BTreeMap<String, Vec<(String, i64)>>,
+    /// Variables that are event indicators (FMI 3.0).
+    pub indicators: Vec<Unknown>,
+    /// Log categories.
+    pub log_categories: Vec<LogCategory>,
+    /// Units by name, in the order of the file.
+    pub units: IndexMap<String, Unit>,
+    /// Declared types by name, in the order of the file.
+    pub types: IndexMap<String, Type>,
     /// Whether the names of variables are structured (`variableNamingConvention`).
     pub structured_names: bool,
     /// Faults, each with a message.
@@ -80,5 +112,11 @@ impl ModelDescription {
             Interface::CoSimulation => self.co_simulation.as_ref(),
             Interface::ModelExchange => self.model_exchange.as_ref(),
         }
+    }
+
+    /// Returns the items of an enumeration; `None` if it is not a declared type with items.
+    pub fn items_of(&self, declared_type: Option<&str>) -> Option<&[Item]> {
+        let declared = self.types.get(declared_type?)?;
+        Some(&*declared.items).filter(|items| !items.is_empty())
     }
 }

@@ -1,10 +1,10 @@
 //! Capabilities of an FMU for one interface type.
 
 use super::faults::Faults;
-use super::read::attribute_or_empty;
+use super::read::{attribute_or_empty, elements};
 use crate::{Standard, is_plain_file_name, shown};
 use roxmltree::Node;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// Capabilities of an FMU for one interface type.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,43 +26,51 @@ pub struct Offer {
     pub saves_states: bool,
     /// Whether saved states can be serialized (`canSerializeFMUstate`).
     pub serializes_states: bool,
-    /// Names of the attributes that are true.
-    flags: BTreeSet<&'static str>,
-    fixed_internal_step_size: Option<f64>,
+    /// Highest order of output derivatives (`maxOutputDerivativeOrder`), if given.
+    pub max_output_derivative_order: Option<u32>,
+    /// Names of the C sources that an importer compiles (FMI 2.0).
+    pub source_files: Vec<String>,
+    /// The Boolean attributes that the description contains.
+    pub(super) flags: BTreeMap<&'static str, bool>,
+    pub(super) fixed_internal_step_size: Option<f64>,
 }
 
-/// The Boolean attributes of interface types in FMI 2.0 and 3.0.
-const FLAGS: [&str; 21] = [
-    "canBeInstantiatedOnlyOncePerProcess",
+/// The Boolean attributes of interface types in FMI 2.0 and 3.0, in the order in which they are written.
+pub(super) const FLAGS: [&str; 21] = [
+    "completedIntegratorStepNotNeeded",
     "canGetAndSetFMUState",
-    "canGetAndSetFMUstate",
+    "canSerializeFMUState",
+    "providesDirectionalDerivatives",
+    "providesAdjointDerivatives",
+    "providesPerElementDependencies",
+    "needsCompletedIntegratorStep",
     "canHandleVariableCommunicationStepSize",
     "canInterpolateInputs",
-    "canNotUseMemoryManagementFunctions",
-    "canReturnEarlyAfterIntermediateUpdate",
     "canRunAsynchronuously",
-    "canSerializeFMUState",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
     "canSerializeFMUstate",
-    "completedIntegratorStepNotNeeded",
-    "hasEventMode",
-    "mightReturnEarlyFromDoStep",
-    "needsCompletedIntegratorStep",
-    "needsExecutionTool",
-    "providesAdjointDerivatives",
     "providesDirectionalDerivative",
-    "providesDirectionalDerivatives",
-    "providesEvaluateDiscreteStates",
     "providesIntermediateUpdate",
-    "providesPerElementDependencies",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "mightReturnEarlyFromDoStep",
+    "hasEventMode",
+    "providesEvaluateDiscreteStates",
+    "needsExecutionTool",
+    "canBeInstantiatedOnlyOncePerProcess",
 ];
 
 impl Offer {
-    pub(super) fn read(node: Node, standard: Standard, faults: &Faults) -> Self {
-        let is_true = |name: &&str| faults.read(node, name) == Some(true);
-        let flags: BTreeSet<&'static str> = FLAGS.into_iter().filter(is_true).collect();
-        let is_either = |names: &[&str]| names.iter().any(|name| flags.contains(name));
+    /// Returns the capabilities with these Boolean attributes; those without a value are missing in the description.
+    ///
+    /// # Panics
+    /// If an attribute is none of FMI 2.0 or 3.0.
+    pub fn new(standard: Standard, identifier: impl Into<String>, flags: &[(&'static str, bool)]) -> Self {
+        let flags: BTreeMap<_, _> = flags.iter().copied().collect();
+        assert!(flags.keys().all(|name| FLAGS.contains(name)), "{flags:?} has an unknown attribute");
+        let is_either = |names: &[&str]| names.iter().any(|name| flags.get(name) == Some(&true));
         Self {
-            identifier: attribute_or_empty(node, "modelIdentifier"),
+            identifier: identifier.into(),
             once_per_process: is_either(&["canBeInstantiatedOnlyOncePerProcess"]),
             needs_execution_tool: is_either(&["needsExecutionTool"]),
             variable_step_size: is_either(&["canHandleVariableCommunicationStepSize"]),
@@ -73,8 +81,22 @@ impl Offer {
             ]),
             saves_states: is_either(&["canGetAndSetFMUstate", "canGetAndSetFMUState"]),
             serializes_states: is_either(&["canSerializeFMUstate", "canSerializeFMUState"]),
+            max_output_derivative_order: None,
+            source_files: Vec::new(),
             flags,
+            fixed_internal_step_size: None,
+        }
+    }
+
+    pub(super) fn read(node: Node, standard: Standard, faults: &Faults) -> Self {
+        let flag = |name| Some((name, faults.read(node, name)?));
+        let flags: Vec<_> = FLAGS.into_iter().filter_map(flag).collect();
+        let sources = elements(node, "SourceFiles");
+        Self {
+            max_output_derivative_order: faults.read(node, "maxOutputDerivativeOrder"),
+            source_files: sources.map(|file| attribute_or_empty(file, "name")).collect(),
             fixed_internal_step_size: faults.read(node, "fixedInternalStepSize"),
+            ..Self::new(standard, attribute_or_empty(node, "modelIdentifier"), &flags)
         }
     }
 
@@ -92,7 +114,7 @@ impl Offer {
 
     /// Returns whether at least one of these attributes is true.
     pub fn can(&self, names: &[&str]) -> bool {
-        names.iter().any(|name| self.flags.contains(name))
+        names.iter().any(|name| self.flags.get(name) == Some(&true))
     }
 
     /// Returns the step size to which communication points should be aligned (`fixedInternalStepSize`, FMI 3.0), if it is a

@@ -1,7 +1,7 @@
 //! Variables of model descriptions.
 
-use super::Clock;
-use crate::{BaseType, Causality, Initial, IntervalVariability, Variability};
+use super::{Attributes, Clock};
+use crate::{BaseType, Causality, Initial, IntervalVariability, Value, Variability};
 use std::sync::Arc;
 
 /// A variable; an array of FMI 3.0 is one variable.
@@ -31,19 +31,8 @@ pub struct Variable {
     /// Whether the array, together with the arrays before it that are not too large, has more than [`MAX_VALUES`](super::MAX_VALUES)
     /// values.
     pub is_too_large: bool,
-    /// Smallest value of the variable or of its declared type, if given.
-    pub min: Option<f64>,
-    /// Largest value of the variable or of its declared type, if given.
-    pub max: Option<f64>,
-    /// Nominal value of the variable or of its declared type; 1 if it is missing or not positive.
-    pub nominal: f64,
-    /// Unit of the variable or of its declared type, if given.
-    pub unit: Option<Arc<str>>,
-    /// Display unit of the variable or of its declared type, if given.
-    pub display_unit: Option<Arc<str>>,
-    /// Whether the variable or its declared type is a difference of physical quantities (`relativeQuantity`), whose conversion to a
-    /// display unit has no offset (section 2.2.3 of FMI 2.0, 2.4.4 of FMI 3.0).
-    pub is_relative: bool,
+    /// Attributes of the variable or of its declared type.
+    pub attributes: Attributes,
     /// Name of the declared type, if given.
     pub declared_type: Option<String>,
     /// Index of the variable of which this variable is the time derivative.
@@ -76,6 +65,39 @@ pub struct Alias {
 }
 
 impl Variable {
+    /// Returns a scalar without start value, whose other attributes are missing. `initial` has no default then.
+    pub fn scalar(
+        name: impl Into<String>,
+        reference: u32,
+        base: BaseType,
+        causality: Causality,
+        variability: Variability,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            reference,
+            base: Some(base),
+            causality,
+            variability,
+            has_variability: true,
+            initial: None,
+            start: Vec::new(),
+            dimensions: Some(Vec::new()),
+            size: Some(1),
+            is_too_large: false,
+            attributes: Attributes::default(),
+            declared_type: None,
+            derivative_of: None,
+            reinit: false,
+            clocked: false,
+            clocks: Vec::new(),
+            once_per_instant: false,
+            clock: None,
+            description: String::new(),
+            aliases: Vec::new(),
+        }
+    }
+
     /// Returns the start value of an element. If an array has only one start value, it applies to each element.
     pub fn start_of(&self, element: usize) -> Option<&str> {
         let is_repeated = self.start.len() == 1 && self.size.is_some_and(|size| element < size);
@@ -104,6 +126,21 @@ impl Variable {
             ([one], Some(size)) => number(one).map_or(Vec::new(), |one| vec![one; size]),
             (all, _) => all.iter().map_while(|value| number(value)).collect(),
         }
+    }
+
+    /// Returns the smallest value, if given. A large integer is rounded.
+    pub fn min(&self) -> Option<f64> {
+        self.attributes.min.as_ref().map(number)
+    }
+
+    /// Returns the largest value, if given. A large integer is rounded.
+    pub fn max(&self) -> Option<f64> {
+        self.attributes.max.as_ref().map(number)
+    }
+
+    /// Returns the nominal value; 1 if it is missing or not positive.
+    pub fn nominal(&self) -> f64 {
+        self.attributes.nominal.filter(|nominal| *nominal > 0.0).unwrap_or(1.0)
     }
 
     /// Subtracts the size of an array from the number of values that remain for all arrays. If too few remain, the
@@ -140,5 +177,12 @@ impl Variable {
     /// Returns whether the values are numbers or Booleans.
     pub fn is_number(&self) -> bool {
         !matches!(self.base, None | Some(BaseType::String | BaseType::Binary))
+    }
+}
+
+fn number(limit: &Value) -> f64 {
+    match limit {
+        Value::Integer(limit) => *limit as f64,
+        other => other.real(),
     }
 }

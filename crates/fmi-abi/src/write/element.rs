@@ -24,6 +24,11 @@ impl Element {
         Self { name: name.into(), attributes: Vec::new(), children: Vec::new(), text: String::new() }
     }
 
+    /// An element with these children; `None` if there are none, because schemas do not allow empty lists.
+    pub fn list(name: &str, children: impl IntoIterator<Item = Self>) -> Option<Self> {
+        Some(Self::new(name).containing(children)).filter(|list| !list.children.is_empty())
+    }
+
     /// The element with another attribute.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, value: impl Display) -> Self {
@@ -91,4 +96,9 @@ impl Element {
         self.children.iter().try_for_each(|child| child.write(writer))?;
         writer.write_event(Event::End(end))
     }
+}
+
+/// Returns a string unless it is empty, for an attribute that may be missing.
+pub fn filled(string: &str) -> Option<&str> {
+    Some(string).filter(|string| !string.is_empty())
 }

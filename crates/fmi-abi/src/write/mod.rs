@@ -2,7 +2,7 @@
 
 mod element;
 
-pub use element::Element;
+pub use element::{Element, filled};
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Write};
 use std::path::Path;

@@ -51,8 +51,9 @@ impl Perturbed {
         unknowns.iter().find_map(|unknown| {
             let [one, other, again] = [0, 1, 2].map(|which| value_of(run, &self.0[which], *unknown));
             let (one, other, again) = (one?, other?, again?);
-            let differ =
-                |to: &Values| one.differ_beyond(to, LAST_DIGITS, |_| description.variables[*unknown].nominal);
+            let differ = |to: &Values| {
+                one.differ_beyond(to, LAST_DIGITS, |_| description.variables[*unknown].nominal())
+            };
             let at = differ(&other)?;
             let [name, known] = [*unknown, known].map(|index| &description.variables[index].name);
             let (from, to) = (one.show(at), other.show(at));

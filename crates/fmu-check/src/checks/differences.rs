@@ -126,9 +126,9 @@ fn nonzero(
 
 /// Returns the step of the differences at a value; `None` if a step up or down leaves the range of the variable.
 fn step_in_range(variable: &Variable, value: f64) -> Option<f64> {
-    let step = 1e-4 * variable.nominal.max(value.abs()).max(1e-3);
+    let step = 1e-4 * variable.nominal().max(value.abs()).max(1e-3);
     let is_in_range = |number: f64| {
-        variable.min.is_none_or(|min| number >= min) && variable.max.is_none_or(|max| number <= max)
+        variable.min().is_none_or(|min| number >= min) && variable.max().is_none_or(|max| number <= max)
     };
     (is_in_range(value - step) && is_in_range(value + step)).then_some(step)
 }

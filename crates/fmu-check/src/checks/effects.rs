@@ -70,7 +70,7 @@ fn other_values_of(description: &Description, indices: &[usize]) -> Vec<Vec<(usi
         let others = indices.iter().map(|index| Some((*index, other_values(description, *index)?)));
         found.push(others.collect());
     }
-    found.extend([all(&|variable, _| variable.min), all(&|variable, _| variable.max)]);
+    found.extend([all(&|variable, _| variable.min()), all(&|variable, _| variable.max())]);
     let mut found: Vec<_> = found.into_iter().flatten().collect();
     found.retain(|values| {
         values
@@ -86,9 +86,9 @@ const MOST_ITEMS: usize = 8;
 /// Returns the numbers of the items, if the variable is an enumeration.
 fn items(description: &Description, index: usize) -> Option<Vec<f64>> {
     let variable = &description.variables[index];
-    let items = description.enumerations.get(variable.declared_type.as_deref()?)?;
+    let items = description.items_of(variable.declared_type.as_deref())?;
     (variable.base == Some(BaseType::Enumeration))
-        .then(|| items.iter().map(|(_, item)| *item as f64).collect())
+        .then(|| items.iter().map(|item| item.value as f64).collect())
 }
 
 /// Calls of a simulation with other values of a parameter.

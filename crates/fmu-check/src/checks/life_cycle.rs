@@ -77,7 +77,7 @@ fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
 /// Enables all log categories together and one at a time: after instantiation, in Initialization Mode, after it, and after two steps.
 fn logging(writer: &mut Writer, _: &Trajectory) {
     let categories: Vec<Option<Vec<u8>>> =
-        writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
+        writer.description.log_categories.iter().map(|of| Some(of.name.clone().into_bytes())).collect();
     for part in [Make, Enter, Leave, Points(2)] {
         writer.write(0, &[part]);
         writer.call(0, "SetDebugLogging", vec![Arg::Integer(1), Arg::Integer(0), Arg::Null]);

@@ -79,8 +79,8 @@ impl Simulation {
 /// Returns the limits of the range of a variable that differ from its start value, each with the name of its attribute.
 fn limits_of(variable: &Variable) -> impl Iterator<Item = (&'static str, f64)> {
     let starts = variable.starts();
-    let scale = starts.iter().fold(variable.nominal, |most, start| most.max(start.abs()));
-    [("min", variable.min), ("max", variable.max)].into_iter().filter_map(move |(name, limit)| {
+    let scale = starts.iter().fold(variable.nominal(), |most, start| most.max(start.abs()));
+    [("min", variable.min()), ("max", variable.max())].into_iter().filter_map(move |(name, limit)| {
         let limit = limit.filter(|limit| limit.abs() < FAR * scale)?;
         starts.iter().any(|start| *start != limit).then_some((name, limit))
     })

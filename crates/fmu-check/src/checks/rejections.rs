@@ -137,7 +137,7 @@ fn input_calls(
             && other.size == Some(1)
     });
     let second = another.map_or(reference, |other| u64::from(other.reference));
-    let beyond = variable.max.map(|max| ([second, reference], max + 1.0 + max.abs(), "beyond its max"));
+    let beyond = variable.max().map(|max| ([second, reference], max + 1.0 + max.abs(), "beyond its max"));
     let values = [([reference, second], f64::NAN, "and NaN for a second")].into_iter().chain(beyond);
     let invalid = |(references, number, what): ([u64; 2], f64, &str)| {
         let args = set(checker, references.to_vec(), kind, vec![other, kind.bits(number)]);

@@ -250,7 +250,7 @@ fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64
     {
         let (first, second, third) = (eight - four, sixteen - eight, more - sixteen);
         let is_like = |one: f64, other: f64| (one - other).abs() < 0.02 * other.abs();
-        let scale = eight.abs().max(1e-3 * variable.nominal);
+        let scale = eight.abs().max(1e-3 * variable.nominal());
         if is_like(second, 2.0 * first) && is_like(third, second) && first.abs() > 1e-10 * scale {
             return Some(format!(
                 "{name} is {four:?} after 4 steps, {eight:?} after 8, {sixteen:?} after 16 and {more:?} after 24 to the \
@@ -261,7 +261,7 @@ fn different_in_steps(description: &Description, index: usize, values: &[Vec<f64
     let comparisons = ["half as many steps", "twice as many steps"];
     values[1..].iter().zip(comparisons).find_map(|(others, comparison)| {
         let off = |(one, other): &(&f64, &f64)| {
-            let scale = one.abs().max(other.abs()).max(1e-3 * variable.nominal);
+            let scale = one.abs().max(other.abs()).max(1e-3 * variable.nominal());
             (*one - *other).abs() > 1e-2 * scale
         };
         let (one, other) = values[0].iter().zip(others).find(off)?;

@@ -197,7 +197,7 @@ impl Compared {
             let is_constant = numbers.windows(2).all(|pair| pair[0] == pair[1]);
             let least = slopes.iter().fold(f64::INFINITY, |least, slope| least.min(slope.abs()));
             let same_sign = slopes.windows(2).all(|pair| pair[0] * pair[1] > 0.0);
-            let scale = numbers[0].abs().max(1e-3 * description.variables[state].nominal);
+            let scale = numbers[0].abs().max(1e-3 * description.variables[state].nominal());
             let must_move = same_sign && least * shifted.size > 1e-6 * scale;
             (usual_moves && is_constant && must_move).then(|| {
                 let (name, value, slope) = (&description.variables[state].name, numbers[0], slopes[0]);

@@ -94,7 +94,8 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
     ("start_values.range", |variable, value| {
         let ranged = variable.base.is_some_and(|base| !base.is_float())
             && [Causality::Local, Causality::Output].contains(&variable.causality);
-        let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
+        let (min, max) =
+            (variable.min().unwrap_or(f64::NEG_INFINITY), variable.max().unwrap_or(f64::INFINITY));
         let wrong = ranged && value.numbers().iter().any(|number| *number < min || *number > max);
         wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
     }),

@@ -76,7 +76,8 @@ pub fn difference(
         let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
         let of_pair = |(first, second): (&Values, &Values)| {
             let nominal = |index| {
-                variable_at(one, index).map_or(1.0, |(variable, ..)| description.variables[variable].nominal)
+                variable_at(one, index)
+                    .map_or(1.0, |(variable, ..)| description.variables[variable].nominal())
             };
             let index = first.differ_beyond(second, tolerance, nominal)?;
             Some([name_at(description, one, index), first.show(index), second.show(index)])

@@ -62,17 +62,17 @@ fn versions(plan: &Plan, model: &LoadedModel) -> Vec<Standard> {
     if let Some(fmi) = plan.fmi {
         return vec![fmi];
     }
-    let lacking = model.table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
+    let lacking = model.table.variables.iter().find(|variable| !variable.base.is_in_fmi2());
     let Some(variable) = lacking.filter(|_| default.contains(&Standard::Fmi3)) else {
         return default.clone();
     };
-    println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name, variable.base());
+    println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name, variable.base);
     vec![Standard::Fmi3]
 }
 
 /// Whether FMI 2.0 has the types of all variables.
 fn is_in_fmi2(model: &LoadedModel) -> bool {
-    model.table.variables.iter().all(|variable| variable.base().is_in_fmi2())
+    model.table.variables.iter().all(|variable| variable.base.is_in_fmi2())
 }
 
 impl Described {

@@ -175,7 +175,13 @@ impl CompiledPage<'_> {
             module: with_stamp(module, guid, Some(starts))?,
         };
         let runnables: Vec<_> = std::iter::once(model).chain(self.companions.iter().cloned()).collect();
-        page_html::page(written, content, (&info.name, &info.description), &runnables, &self.page.scripts)
+        page_html::page(
+            written,
+            content,
+            (&info.name, &info.about.description),
+            &runnables,
+            &self.page.scripts,
+        )
     }
 }
 

@@ -1,8 +1,9 @@
 //! Reads units, display units and declared types.
 
-use super::{attribute_or_empty, child};
+use super::{attribute_or_empty, base_of, child};
 use crate::description::faults::{Fault, Faults};
-use crate::{BaseUnit, DisplayUnit, Standard, Unit, shown};
+use crate::description::{Attributes, Item, Type};
+use crate::{BaseType, BaseUnit, DisplayUnit, Standard, Unit, Value, shown};
 use roxmltree::Node;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -26,62 +27,89 @@ pub(super) fn unit(node: Node, faults: &Faults) -> (String, Unit) {
     (attribute_or_empty(node, "name"), Unit { base, display_units: display_units.collect() })
 }
 
-/// Attributes of a declared type, which are read once for all variables of this type.
-pub(super) struct Declared<'a> {
-    /// Name of the base type; empty if it is missing.
-    pub base: &'a str,
-    pub unit: Option<Arc<str>>,
-    pub display_unit: Option<Arc<str>>,
-    pub min: Option<f64>,
-    pub max: Option<f64>,
-    pub nominal: Option<f64>,
-    pub is_relative: Option<bool>,
-}
-
-impl<'a> Declared<'a> {
-    /// In FMI 2.0, a child element has the name of the base type and the attributes (section 2.2.3). In FMI 3.0, the element is called, for
-    /// example, `Float64Type` (section 2.4.4).
-    pub fn read(node: Node<'a, 'a>, standard: Standard, faults: &Faults) -> Self {
-        let inner = node.first_element_child();
-        let base = match standard {
-            Standard::Fmi2 => inner.map_or("", |inner| inner.tag_name().name()),
-            Standard::Fmi3 => node.tag_name().name().strip_suffix("Type").unwrap_or_default(),
-        };
-        let owner = |name: &str| match inner {
-            Some(inner) if !node.has_attribute(name) => inner,
-            _ => node,
-        };
-        let text = |name: &str| owner(name).attribute(name).map(Arc::from);
-        let number = |name: &str| faults.read(owner(name), name);
-        Self {
-            base,
-            unit: text("unit"),
-            display_unit: text("displayUnit"),
-            min: number("min"),
-            max: number("max"),
-            nominal: number("nominal"),
-            is_relative: faults.read(owner("relativeQuantity"), "relativeQuantity"),
-        }
+/// Reads a declared type. In FMI 2.0, a child element has the name of the base type and the attributes (section 2.2.3). In FMI 3.0, the
+/// element is called, for example, `Float64Type` (section 2.4.4).
+pub(super) fn declared_type(node: Node, standard: Standard, faults: &Faults) -> Type {
+    let inner = match standard {
+        Standard::Fmi2 => node.children().find(Node::is_element).unwrap_or(node),
+        Standard::Fmi3 => node,
+    };
+    let name = inner.tag_name().name();
+    let base = if standard == Standard::Fmi2 { name } else { name.strip_suffix("Type").unwrap_or_default() };
+    let base = base_of(standard, base);
+    Type {
+        base,
+        attributes: attributes(inner, base, None, faults),
+        items: items(node, inner, faults),
+        description: attribute_or_empty(node, "description"),
     }
 }
 
-/// Reads an enumeration. In FMI 2.0 the type element contains an element for the base type (section 2.2.3);
-/// in FMI 3.0 they are one element (2.4.4).
-pub(super) fn enumeration(node: Node, faults: &Faults) -> Option<(String, Vec<(String, i64)>)> {
-    let items = node.descendants().filter(|item| item.has_tag_name("Item"));
-    let item = |item: Node| Some((item.attribute("name")?.to_owned(), faults.read(item, "value")?));
-    let items: Vec<_> = items.filter_map(item).collect();
+/// Reads the attributes of a variable or a declared type. A variable has the attributes of its declared type except where it has its own.
+pub(super) fn attributes(
+    node: Node,
+    base: Option<BaseType>,
+    declared: Option<&Attributes>,
+    faults: &Faults,
+) -> Attributes {
+    let text = |name: &str, of_declared: fn(&Attributes) -> &Option<Arc<str>>| {
+        node.attribute(name).map(Arc::from).or_else(|| of_declared(declared?).clone())
+    };
+    let limit = |name: &str, of_declared: fn(&Attributes) -> &Option<Value>| match node.attribute(name) {
+        // An f64 does not have all digits of an integer.
+        Some(limit) => base
+            .filter(|base| !base.is_float())
+            .and_then(|_| limit.trim().parse().ok().map(Value::Integer))
+            .or_else(|| faults.read(node, name).map(Value::Real)),
+        None => of_declared(declared?).clone(),
+    };
+    let nominal = match node.has_attribute("nominal") {
+        true => faults.read(node, "nominal"),
+        false => declared.and_then(|of| of.nominal),
+    };
+    let is_relative = match node.has_attribute("relativeQuantity") {
+        true => faults.read(node, "relativeQuantity") == Some(true),
+        false => declared.is_some_and(|of| of.is_relative),
+    };
+    let max_size = match node.has_attribute("maxSize") {
+        true => faults.read(node, "maxSize"),
+        false => declared.and_then(|of| of.max_size),
+    };
+    Attributes {
+        quantity: text("quantity", |of| &of.quantity),
+        unit: text("unit", |of| &of.unit),
+        display_unit: text("displayUnit", |of| &of.display_unit),
+        is_relative,
+        min: limit("min", |of| &of.min),
+        max: limit("max", |of| &of.max),
+        nominal,
+        mime_type: text("mimeType", |of| &of.mime_type),
+        max_size,
+    }
+}
+
+/// Reads the items of an enumeration.
+fn items(node: Node, inner: Node, faults: &Faults) -> Vec<Item> {
+    let item = |item: Node| {
+        Some(Item {
+            name: item.attribute("name")?.to_owned(),
+            value: faults.read(item, "value")?,
+            description: attribute_or_empty(item, "description"),
+        })
+    };
+    let items: Vec<_> = inner.children().filter(|item| item.has_tag_name("Item")).filter_map(item).collect();
     let (mut names, mut values) = (HashSet::new(), HashSet::new());
-    let mut is_new = |(name, value): &&(String, i64)| names.insert(name.clone()) & values.insert(*value);
-    if let Some((name, value)) = items.iter().find(|item| !is_new(item)) {
+    let mut is_new = |item: &&Item| names.insert(item.name.clone()) & values.insert(item.value);
+    if let Some(item) = items.iter().find(|item| !is_new(item)) {
         let of = || shown(node.attribute("name").unwrap_or_default());
         faults.add(Fault::Definition, || {
             format!(
-                "the item {} = {value} of {} has the name or the value of another item",
-                shown(name),
+                "the item {} = {} of {} has the name or the value of another item",
+                shown(&item.name),
+                item.value,
                 of()
             )
         });
     }
-    (!items.is_empty()).then(|| Some((node.attribute("name")?.to_owned(), items)))?
+    items
 }

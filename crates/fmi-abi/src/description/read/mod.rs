@@ -5,9 +5,9 @@ mod structure;
 mod variables;
 
 use super::faults::{Fault, Faults};
-use super::{ModelDescription, Offer};
+use super::{About, LogCategory, ModelDescription, Offer};
 use crate::{BaseType, Standard, shown, shown_number};
-use definitions::{enumeration, unit};
+use definitions::{declared_type, unit};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use variables::variables;
@@ -60,7 +60,8 @@ impl ModelDescription {
         [&co_simulation, &model_exchange].into_iter().flatten().try_for_each(Offer::check)?;
         let experiment = child(root, "DefaultExperiment");
         let time = |name: &str| -> Option<f64> { faults.read(experiment?, name) };
-        let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
+        let named =
+            |list| elements(root, list).filter_map(|node| Some((node.attribute("name")?.to_owned(), node)));
         let tolerance = time("tolerance");
         if let Some(tolerance) = tolerance.filter(|tolerance| *tolerance < 0.0) {
             faults
@@ -68,22 +69,34 @@ impl ModelDescription {
         }
         let unique = |list, fault, what: &str| {
             let mut known = HashSet::new();
-            for name in named(list).filter(|name| !known.insert(name.clone())) {
+            for (name, _) in named(list).filter(|(name, _)| !known.insert(name.clone())) {
                 faults.add(fault, || format!("two {what} are called {}", shown(&name)));
             }
         };
         unique("UnitDefinitions", Fault::Unit, "units");
         unique("TypeDefinitions", Fault::Definition, "types");
-        let (variables, positions) = variables(root, standard, structure, &faults)?;
-        let types = || elements(root, "TypeDefinitions");
+        let types = named("TypeDefinitions");
+        let types = types.map(|(name, node)| (name, declared_type(node, standard, &faults))).collect();
+        let (variables, positions) = variables(root, standard, &types, structure, &faults)?;
+        let category =
+            |(name, node)| LogCategory { name, description: attribute_or_empty(node, "description") };
         let mut description = Self {
             standard,
             version,
             model_name: attribute_or_empty(root, "modelName"),
             token: attribute_or_empty(root, token),
+            about: About {
+                description: attribute_or_empty(root, "description"),
+                author: attribute_or_empty(root, "author"),
+                version: attribute_or_empty(root, "version"),
+                copyright: attribute_or_empty(root, "copyright"),
+                license: attribute_or_empty(root, "license"),
+                generation_tool: attribute_or_empty(root, "generationTool"),
+            },
             co_simulation,
             model_exchange,
-            scheduled_execution: child(root, "ScheduledExecution").is_some(),
+            scheduled_execution: child(root, "ScheduledExecution")
+                .map(|node| Offer::read(node, standard, &faults)),
             default_experiment: ["startTime", "stopTime", "stepSize"].map(time),
             default_tolerance: tolerance.filter(|tolerance| tolerance.is_finite() && *tolerance > 0.0),
             variables,
@@ -91,10 +104,10 @@ impl ModelDescription {
             derivatives: Vec::new(),
             initial_unknowns: Vec::new(),
             event_indicators: None,
-            log_categories: named("LogCategories").collect(),
+            indicators: Vec::new(),
+            log_categories: named("LogCategories").map(category).collect(),
             units: elements(root, "UnitDefinitions").map(|node| unit(node, &faults)).collect(),
-            types: named("TypeDefinitions").collect(),
-            enumerations: types().filter_map(|node| enumeration(node, &faults)).collect(),
+            types,
             structured_names: root.attribute("variableNamingConvention").map(str::trim) == Some("structured"),
             faults: Vec::new(),
         };
@@ -117,6 +130,6 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
-fn elements<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+pub(super) fn elements<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
 }

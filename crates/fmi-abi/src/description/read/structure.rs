@@ -70,6 +70,7 @@ impl ModelDescription {
                 count.checked_add(self.variables[unknown.variable].size?)
             }),
         };
+        self.indicators = indicators;
     }
 }
 

@@ -1,11 +1,12 @@
 //! Reads variables (section 2.2.7 of FMI 2.0, 2.4.7 of FMI 3.0).
 
-use super::definitions::Declared;
+use super::definitions::attributes;
 use super::{attribute_or_empty, base_of, elements};
 use crate::attribute::value;
 use crate::description::faults::{Fault, Faults};
-use crate::description::{Alias, Clock, MAX_VALUES, Variable};
+use crate::description::{Alias, Clock, MAX_VALUES, Type, Variable};
 use crate::{BaseType, Causality, Initial, Standard, Variability, shown};
+use indexmap::IndexMap;
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -29,12 +30,10 @@ impl Positions {
 pub(super) fn variables(
     root: Node,
     standard: Standard,
+    types: &IndexMap<String, Type>,
     structure: &HashMap<u32, usize>,
     faults: &Faults,
 ) -> Result<(Vec<Variable>, Positions), String> {
-    let types: HashMap<&str, Declared> = elements(root, "TypeDefinitions")
-        .filter_map(|node| Some((node.attribute("name")?, Declared::read(node, standard, faults))))
-        .collect();
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
     reserve(root, &nodes)?;
     let quiet = |node: Node, name: &str| value(node, name).and_then(Result::ok);
@@ -76,10 +75,16 @@ pub(super) fn variables(
         };
         positions.0.push(Some(found.len()));
         let declared = of_type.attribute("declaredType").and_then(|name| types.get(name));
-        let base = of_type.tag_name().name();
+        let base = base_of(standard, of_type.tag_name().name());
         if let Some(other) = declared.map(|declared| declared.base).filter(|other| *other != base) {
+            let name = |base: Option<BaseType>| base.and_then(|base| base.element(standard));
             faults.add(Fault::Definition, || {
-                format!("{} is of type {base}, but its declaredType is of type {}", named(), shown(other))
+                format!(
+                    "{} is of type {}, but its declaredType is of {}",
+                    named(),
+                    of_type.tag_name().name(),
+                    name(other).map_or("an unknown type".to_owned(), |other| format!("type {other}"))
+                )
             });
         }
         // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
@@ -134,21 +139,10 @@ fn reserve(root: Node, nodes: &[Node]) -> Result<(), String> {
 fn variable(
     node: Node,
     of_type: Node,
-    declared: Option<&Declared>,
+    declared: Option<&Type>,
     (standard, reference, dimensions): (Standard, u32, Option<Vec<usize>>),
     faults: &Faults,
 ) -> Variable {
-    let shared = |name: &str, of_declared: fn(&Declared) -> Option<Arc<str>>| {
-        of_type.attribute(name).map(Arc::from).or_else(|| of_declared(declared?))
-    };
-    let limit = |name: &str, of_declared: fn(&Declared) -> Option<f64>| match of_type.has_attribute(name) {
-        true => faults.read(of_type, name),
-        false => declared.and_then(of_declared),
-    };
-    let is_relative = match of_type.has_attribute("relativeQuantity") {
-        true => faults.read(of_type, "relativeQuantity"),
-        false => declared.and_then(|of| of.is_relative),
-    };
     let base = base_of(standard, of_type.tag_name().name());
     let causality = faults.read(node, "causality").unwrap_or(Causality::Local);
     let variability = faults.read(node, "variability");
@@ -169,12 +163,7 @@ fn variable(
         dimensions,
         size,
         is_too_large: false,
-        min: limit("min", |of| of.min),
-        max: limit("max", |of| of.max),
-        nominal: limit("nominal", |of| of.nominal).filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
-        unit: shared("unit", |of| of.unit.clone()),
-        display_unit: shared("displayUnit", |of| of.display_unit.clone()),
-        is_relative: is_relative == Some(true),
+        attributes: attributes(of_type, base, declared.map(|of| &of.attributes), faults),
         declared_type: of_type.attribute("declaredType").map(str::to_owned),
         derivative_of: None,
         reinit: faults.read(of_type, "reinit") == Some(true),

@@ -132,10 +132,10 @@ pub fn value(description: &Description, variable: &Variable, text: &str) -> Resu
         },
         BaseType::Enumeration => {
             let items = description.items(variable).unwrap_or_default();
-            let found = items.iter().find(|(name, number)| name == text || text.parse() == Ok(*number));
-            let names = || items.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-            let (_, item) = found.with_context(|| format!("it must be one of {}", names()))?;
-            Ok(Value::Real(*item as f64))
+            let found = items.iter().find(|item| item.name == text || text.parse() == Ok(item.value));
+            let names = || items.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
+            let item = found.with_context(|| format!("it must be one of {}", names()))?;
+            Ok(Value::Real(item.value as f64))
         }
         _ => {
             let value = number(text)?;

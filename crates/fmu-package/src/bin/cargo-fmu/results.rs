@@ -27,7 +27,7 @@ impl<'a> Column<'a> {
             BaseType::Boolean => vec![(0.0, "false".to_owned()), (1.0, "true".to_owned())],
             BaseType::Enumeration => {
                 let items = description.items(variable).unwrap_or_default().iter();
-                items.map(|(name, number)| (*number as f64, name.clone())).collect()
+                items.map(|item| (item.value as f64, item.name.clone())).collect()
             }
             _ => Vec::new(),
         };

@@ -61,8 +61,8 @@ impl CheckedStructure<'_> {
     fn initial_value(&self, name: &str, start: &str) -> Result<Element, Error> {
         let found = self.variable(name)?;
         let items = found.description.items(found.variable).unwrap_or_default();
-        Ok(match (items.iter().find(|(item, _)| item == start), found.variable.kind()) {
-            (Some((_, number)), _) => Element::new("Integer").with("value", number),
+        Ok(match (items.iter().find(|item| item.name == start), found.variable.kind()) {
+            (Some(item), _) => Element::new("Integer").with("value", item.value),
             // Not 0 or 1, which few parsers accept.
             (None, "Boolean") => Element::new("Boolean").with("value", boolean(start) == Some(true)),
             (None, kind) => Element::new(kind).with("value", start),

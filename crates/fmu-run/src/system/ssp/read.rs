@@ -5,6 +5,7 @@ use super::source::Base;
 use crate::change::Change;
 use crate::connector::joined;
 use crate::error::Error;
+use fmi_abi::description::Item;
 use fmi_abi::xml::attribute;
 use fmi_abi::{BaseUnit, boolean, shown};
 use roxmltree::Node;
@@ -52,7 +53,7 @@ pub(super) struct Read<'r> {
     pub bindings: Vec<Binding<'r>>,
     pub units: Units,
     /// Items of enumerations by name.
-    pub enumerations: HashMap<String, Vec<(String, i64)>>,
+    pub enumerations: HashMap<String, Vec<Item>>,
     /// Number of bytes that may still be read, or comparisons that may still be made.
     remaining: Cell<usize>,
     /// What was read, but is strange.
@@ -102,8 +103,8 @@ impl<'r> Read<'r> {
     /// Reads what a file defines for all of its systems: units and enumerations.
     pub fn of(path: &'r Path, base: Base<'r>, root: Node) -> Result<Self, String> {
         let item = |item: Node| {
-            let number = attribute(item, "value")?.ok_or_else(|| "an item lacks its value".to_owned())?;
-            Ok((needed(item, "name")?.to_owned(), number))
+            let value = attribute(item, "value")?.ok_or_else(|| "an item lacks its value".to_owned())?;
+            Ok(Item { name: needed(item, "name")?.to_owned(), value, description: String::new() })
         };
         let enumerations = children(root, "Enumerations").map(|of| {
             let items =
@@ -336,10 +337,10 @@ impl Transformation {
     }
 
     /// Returns the change of values between enumerations with these items.
-    pub fn change(&self, from: &[(String, i64)], to: &[(String, i64)]) -> Result<Change, String> {
-        let number = |items: &[(String, i64)], name: &String| {
-            let item = items.iter().find(|(item, _)| item == name);
-            let number = item.map(|(_, number)| *number as f64);
+    pub fn change(&self, from: &[Item], to: &[Item]) -> Result<Change, String> {
+        let number = |items: &[Item], name: &String| {
+            let item = items.iter().find(|item| item.name == *name);
+            let number = item.map(|item| item.value as f64);
             number.ok_or_else(|| format!("{} is not an item of the enumeration", shown(name)))
         };
         match self {

@@ -7,6 +7,7 @@ use crate::connector::{self, Connector, End};
 use crate::error::{Error, request};
 use crate::lookup::Found;
 use crate::system::Definition;
+use fmi_abi::description::Item;
 use fmi_abi::{BaseUnit, shown};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -226,7 +227,7 @@ impl<'r> Read<'r> {
     }
 
     /// Returns the items of the enumeration of a variable or a connector.
-    fn items<'d>(&'d self, definition: &'d Definition, place: Place) -> Option<&'d [(String, i64)]> {
+    fn items<'d>(&'d self, definition: &'d Definition, place: Place) -> Option<&'d [Item]> {
         let of_variable =
             self.variable(definition, place).and_then(|found| found.description.items(found.variable));
         of_variable.or_else(|| {

@@ -6,6 +6,7 @@ use crate::files::STRUCTURE;
 use crate::lookup::Found;
 use crate::system::structure::{CheckedStructure, SystemStructure, document, file_name, split};
 use fmi_abi::BaseUnit;
+use fmi_abi::description::Item;
 use fmi_abi::write::{Element, write_atomically, zip};
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
@@ -61,7 +62,7 @@ impl CheckedStructure<'_> {
                 .with("name", component)
                 .with("type", FMU)
                 .with("source", format!("resources/{}", file_name(path)?))
-                .containing(list("ssd:Connectors", connectors))
+                .containing(Element::list("ssd:Connectors", connectors))
                 .containing(start.then(|| binding(component)));
             elements.push(element);
         }
@@ -75,10 +76,10 @@ impl CheckedStructure<'_> {
         let system = Element::new("ssd:System")
             .with("name", name)
             .with("description", description)
-            .containing(list("ssd:Connectors", connectors))
+            .containing(Element::list("ssd:Connectors", connectors))
             .containing((!inputs.is_empty()).then(|| binding("experiment")))
             .containing([Element::new("ssd:Elements").containing(elements)])
-            .containing(list("ssd:Connections", from_inputs.chain(inside).chain(to_outputs).collect()))
+            .containing(Element::list("ssd:Connections", from_inputs.chain(inside).chain(to_outputs)))
             .containing([self.omsimulator()]);
         let root = Element::new("ssd:SystemStructureDescription")
             .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
@@ -93,7 +94,7 @@ impl CheckedStructure<'_> {
         Ok(root
             .containing([system])
             .containing(enumerations(&used)?)
-            .containing(list("ssd:Units", self.units_of(&used)))
+            .containing(Element::list("ssd:Units", self.units_of(&used)))
             .containing([experiment]))
     }
 
@@ -180,34 +181,25 @@ impl CheckedStructure<'_> {
     }
 }
 
-/// Names and numbers of the items of an enumeration.
-type Items = [(String, i64)];
-
 /// Returns the name and the items of the enumeration of a variable, if it has one.
-fn enumeration<'a>(of: Found<'a>) -> Option<(&'a str, &'a Items)> {
+fn enumeration<'a>(of: Found<'a>) -> Option<(&'a str, &'a [Item])> {
     Some((of.variable.declared_type.as_deref()?, of.description.items(of.variable)?))
 }
 
 /// Returns the enumerations of variables, if there are any.
 fn enumerations(variables: &[Found]) -> Result<Option<Element>, Error> {
-    let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
+    let mut known: BTreeMap<&str, &[Item]> = BTreeMap::new();
     for (name, items) in variables.iter().filter_map(|of| enumeration(*of)) {
         let before = known.entry(name).or_insert(items);
-        if *before != items {
+        if !Item::are_same(before, items) {
             return request(format!("two FMUs have different enumerations with the name {name}"));
         }
     }
-    let element = |(name, items): (&str, &Items)| {
-        let item =
-            |(name, value): &(String, i64)| Element::new("ssc:Item").with("name", name).with("value", value);
+    let element = |(name, items): (&str, &[Item])| {
+        let item = |of: &Item| Element::new("ssc:Item").with("name", &of.name).with("value", of.value);
         Element::new("ssc:Enumeration").with("name", name).containing(items.iter().map(item))
     };
-    Ok(list("ssd:Enumerations", known.into_iter().map(element).collect()))
-}
-
-/// Returns a list element; `None` if it would be empty.
-fn list(name: &str, children: Vec<Element>) -> Option<Element> {
-    (!children.is_empty()).then(|| Element::new(name).containing(children))
+    Ok(Element::list("ssd:Enumerations", known.into_iter().map(element)))
 }
 
 fn connection(from: (&str, &str), to: (&str, &str)) -> Element {
