@@ -1,6 +1,6 @@
 //! Rules that hold for every run, about writes to arrays, statuses, strings, logged messages and processes that are left.
 
-use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Values, all_steps, step_name};
+use crate::call_sequence::{Action, CallSequence, Message, Numbered, Run, Values, action_name, all_actions};
 use crate::description::Description;
 use crate::finding::{Criterion, Finding, SharedCriterion, status_name};
 use crate::rules;
@@ -16,10 +16,10 @@ fn rule(name: &'static str, criterion: impl Criterion) -> Broken {
     (name, Arc::new(criterion))
 }
 
-/// Returns the violations of these rules in a run whose last step has returned: all violations of the rules for arrays, and the
+/// Returns the violations of these rules in a run whose last action has returned: all violations of the rules for arrays, and the
 /// first violation of each other rule.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
-    let all = all_steps(sequence);
+    let all = all_actions(sequence);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
         if let Some(outcome) = run.outcome(numbered.id) {
@@ -60,9 +60,9 @@ fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
     let mut alive = HashMap::new();
     let mut pairs = Vec::new();
     for numbered in all {
-        match &numbered.step {
-            Step::Make(index, _) if alive.insert(*index, numbered.id).is_some() => return None,
-            Step::Free(index) => pairs.extend(alive.remove(index).map(|make| (make, numbered.id))),
+        match &numbered.action {
+            Action::Make(index, _) if alive.insert(*index, numbered.id).is_some() => return None,
+            Action::Free(index) => pairs.extend(alive.remove(index).map(|make| (make, numbered.id))),
             _ => {}
         }
     }
@@ -71,7 +71,7 @@ fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
 
 /// Returns the rules for the arrays, the status and the strings of a call.
 fn rules_of_call(numbered: &Numbered) -> Vec<Broken> {
-    let (id, name) = (numbered.id, step_name(&numbered.step));
+    let (id, name) = (numbered.id, action_name(&numbered.action));
     let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
         let name = name.clone();
         rule(of, move |run| {
@@ -81,7 +81,7 @@ fn rules_of_call(numbered: &Numbered) -> Vec<Broken> {
         })
     });
     let mut broken = Vec::from(arrays);
-    let Step::Call { function, .. } = &numbered.step else { return broken };
+    let Action::Call { function, .. } = &numbered.action else { return broken };
     let max_status = if function == "fmi2DoStep" { 5 } else { 4 };
     broken.push(rule("functions.status", move |run| {
         let status = run.status(id).filter(|status| !(0..=max_status).contains(status))?;
@@ -154,7 +154,7 @@ fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> 
 
 /// Returns the rule that messages are logged with the environment pointer of the importer.
 fn environment(numbered: &Numbered) -> Option<Broken> {
-    let (id, name) = (numbered.id, step_name(&numbered.step));
+    let (id, name) = (numbered.id, action_name(&numbered.action));
     Some(rule("logs.environment", move |run| {
         let message = run.outcome(id)?.strays.first()?;
         let text = show(message.text.as_deref().unwrap_or_default());
@@ -162,21 +162,21 @@ fn environment(numbered: &Numbered) -> Option<Broken> {
     }))
 }
 
-/// Returns the rule that a failed call logs a message; `None` if the sequence changes the logging or a step instantiates without
-/// logging, and for steps that need not log a message.
+/// Returns the rule that a failed call logs a message; `None` if the sequence changes the logging or an action instantiates without
+/// logging, and for actions that need not log a message.
 fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
     let off = sequence.iter().any(|numbered| {
-        matches!(&numbered.step, Step::Make(_, make) if !make.logging)
-            || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
+        matches!(&numbered.action, Action::Make(_, make) if !make.logging)
+            || matches!(&numbered.action, Action::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });
     // Section 4.2.3 of FMI 2.0.5: the FMU returns Discard if it does not provide a status, which is not a failure.
     let asks_status = |function: &str| function.starts_with("fmi2Get") && function.ends_with("Status");
     if off
-        || !matches!(&numbered.step, Step::Call { instance: Some(_), function, .. } if !asks_status(function))
+        || !matches!(&numbered.action, Action::Call { instance: Some(_), function, .. } if !asks_status(function))
     {
         return None;
     }
-    let (id, name) = (numbered.id, step_name(&numbered.step));
+    let (id, name) = (numbered.id, action_name(&numbered.action));
     Some(rule("logs.silent", move |run| {
         let outcome = run.outcome(id)?;
         let status = outcome.status.filter(|status| (2..=4).contains(status))?;

@@ -2,7 +2,7 @@
 //! written to a report.
 
 use crate::call_sequence::{
-    CallSequence, End, Measured, Message, Numbered, Outcome, Run, Step, Values, step_name, step_of,
+    Action, CallSequence, End, Measured, Message, Numbered, Outcome, Run, Values, action_name, action_of,
 };
 use crate::worker::{EVALUATED, changed_setting, tolerated_growth};
 use serde::{Deserialize, Serialize, Serializer};
@@ -13,7 +13,7 @@ pub enum Evidence {
     /// No results are known that show the finding.
     #[default]
     Unknown,
-    /// The process ends in this way during a step of this name, or after all steps if there is no name.
+    /// The process ends in this way during an action of this name, or after all actions if there is no name.
     End(End, Option<String>),
     /// Processes are alive after the end of the call sequence, or too many processes before its end.
     Orphans,
@@ -143,9 +143,9 @@ impl Evidence {
     }
 }
 
-/// Returns the name of the step during which the process ended; `None` if all steps have returned.
+/// Returns the name of the action during which the process ended; `None` if all actions have returned.
 pub fn end_name(run: &Run, sequence: &CallSequence) -> Option<String> {
-    Some(step_name(&step_of(sequence, run.at?)?.step))
+    Some(action_name(&action_of(sequence, run.at?)?.action))
 }
 
 /// Returns whether a quantity grows. If there are repetitions, there must be enough for an evaluation.
@@ -170,8 +170,8 @@ fn grows(measure: Measure, before: &Measured, after: &Measured, run: &Run) -> bo
 /// otherwise of any instance. Which pairs differ may change from run to run.
 pub fn corresponding_reads(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let queries = |sequence: &[Numbered]| -> Vec<(Option<usize>, u32)> {
-        let query = |numbered: &Numbered| match &numbered.step {
-            Step::Call { function, instance, .. } if function[4..].starts_with("Get") => {
+        let query = |numbered: &Numbered| match &numbered.action {
+            Action::Call { function, instance, .. } if function[4..].starts_with("Get") => {
                 Some((*instance, numbered.id))
             }
             _ => None,
@@ -181,7 +181,7 @@ pub fn corresponding_reads(sequence: &CallSequence) -> Vec<[u32; 2]> {
     let single = queries(sequence);
     let mut pairs = Vec::new();
     for numbered in sequence {
-        let Step::Parallel(sequences) = &numbered.step else { continue };
+        let Action::Parallel(sequences) = &numbered.action else { continue };
         for reads in sequences.iter().map(|sequence| queries(sequence)) {
             let own =
                 single.iter().filter(|(of, _)| reads.first().is_some_and(|(instance, _)| of == instance));

@@ -1,6 +1,6 @@
 //! Findings, and the criteria that recognize them in a run.
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Values, step_name, step_of};
+use crate::call_sequence::{Action, CallSequence, End, Numbered, Run, Values, action_name, action_of};
 use crate::evidence::Replay;
 use serde::Serialize;
 use std::sync::Arc;
@@ -111,8 +111,9 @@ pub struct Finding {
     pub fails: bool,
     /// Reason in the baseline why the finding is accepted.
     pub accepted: Option<String>,
-    /// Number of steps before and after shortening.
-    pub steps: (usize, usize),
+    /// Number of actions before and after shortening.
+    #[serde(rename = "steps")]
+    pub length: (usize, usize),
 }
 
 impl Finding {
@@ -140,12 +141,12 @@ pub fn topic_of(name: &str) -> &str {
     name.split('.').next().unwrap_or_default()
 }
 
-/// Returns a description of the end of a process before its last step returned; `None` if the last step returned.
+/// Returns a description of the end of a process before its last action returned; `None` if the last action returned.
 pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
     let name = run
         .at
-        .and_then(|id| step_of(sequence, id))
-        .map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
+        .and_then(|id| action_of(sequence, id))
+        .map_or("the end of the process".to_owned(), |numbered| action_name(&numbered.action));
     Some(match &run.end {
         End::Done => return None,
         End::Crash(why) => format!("{name} crashes ({why})"),
@@ -207,17 +208,17 @@ pub fn failure(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String
 /// Describes this call if it failed: its function is missing, or it returned NULL or a status worse than Warning.
 pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.outcome(id)?;
-    let step = &step_of(sequence, id)?.step;
-    let name = step_name(step);
+    let action = &action_of(sequence, id)?.action;
+    let name = action_name(action);
     if outcome.missing {
         return Some(format!("{name} is not in the library"));
     }
     let status = outcome.status?;
-    let result = match step {
-        Step::Make(..) if status == 0 => "NULL".to_owned(),
-        Step::Call { .. } | Step::Free(_) if status > 1 => status_name(status),
+    let result = match action {
+        Action::Make(..) if status == 0 => "NULL".to_owned(),
+        Action::Call { .. } | Action::Free(_) if status > 1 => status_name(status),
         // Discard means that it was not finished, for example because there were too many events.
-        Step::Integrate(..) if status > 2 => status_name(status),
+        Action::Integrate(..) if status > 2 => status_name(status),
         _ => return None,
     };
     let why = outcome.log.iter().rev().find_map(|message| message.text.as_ref());
@@ -228,9 +229,9 @@ pub fn failure_of(sequence: &CallSequence, run: &Run, id: u32) -> Option<String>
 /// Describes the first failed instantiation, otherwise the first call that returned a status above `max_status`. If `max_status`
 /// is at most 1, a missing function is a failure, too.
 pub fn first_failure(sequence: &CallSequence, run: &Run, max_status: i32) -> Option<String> {
-    let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
+    let made = |numbered: &&Numbered| matches!(numbered.action, Action::Make(..));
     let failed = |numbered: &&Numbered| {
-        matches!(numbered.step, Step::Call { .. })
+        matches!(numbered.action, Action::Call { .. })
             && run.outcome(numbered.id).is_some_and(|outcome| {
                 outcome.status.map_or(outcome.missing && max_status < 2, |status| status > max_status)
             })

@@ -1,7 +1,7 @@
 //! Checks that the standard allows all calls of a sequence, except for the calls that are marked as forbidden. So a forbidden
 //! call that a check makes by mistake never causes a finding.
 
-use crate::call_sequence::{Arg, Make, NULL_INSTANCE, Numbered, Step};
+use crate::call_sequence::{Action, Arg, Make, NULL_INSTANCE, Numbered};
 use crate::description::Description;
 use crate::values::is_other_time;
 use fmi_abi::calls::signature;
@@ -23,19 +23,19 @@ struct State {
     updated: bool,
 }
 
-/// Returns the number of the first step that the standard does not allow. Steps that are marked as forbidden are skipped.
+/// Returns the number of the first action that the standard does not allow. Actions that are marked as forbidden are skipped.
 pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option<u32> {
     walk(description, sequence, &mut Objects::default())
 }
 
-/// States of the instances while the steps of a call sequence are added one after another.
+/// States of the instances while the actions of a call sequence are added one after another.
 #[derive(Default)]
 pub struct Modes(Objects);
 
 impl Modes {
-    /// Updates the states for the next step, unless that step repeats other steps or starts threads.
+    /// Updates the states for the next action, unless that action repeats other actions or starts threads.
     pub fn add(&mut self, description: &Description, next: &Numbered) {
-        if !matches!(next.step, Step::Repeat(..) | Step::Parallel(_)) {
+        if !matches!(next.action, Action::Repeat(..) | Action::Parallel(_)) {
             walk(description, std::slice::from_ref(next), &mut self.0);
         }
     }
@@ -57,38 +57,38 @@ struct Objects {
     bytes: HashMap<usize, State>,
 }
 
-/// Returns the number of the first illegal step, and updates the objects up to and including that step.
+/// Returns the number of the first illegal action, and updates the objects up to and including that action.
 fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects) -> Option<u32> {
-    for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
-        let is_legal = match step {
-            Step::Make(index, make) => objects.make(description, *index, make),
-            Step::Free(index) if *index == NULL_INSTANCE => true,
-            Step::Free(index) => {
+    for Numbered { action, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
+        let is_legal = match action {
+            Action::Make(index, make) => objects.make(description, *index, make),
+            Action::Free(index) if *index == NULL_INSTANCE => true,
+            Action::Free(index) => {
                 objects.slots.retain(|_, (owner, _)| owner != index);
                 objects.instances.remove(index).is_some()
             }
-            Step::Call { instance, function, args } => {
+            Action::Call { instance, function, args } => {
                 instance.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
-            // If the steps are allowed twice in a row, they are allowed any number of times.
-            Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
+            // If the actions are allowed twice in a row, they are allowed any number of times.
+            Action::Repeat(_, actions) => (0..2).all(|_| walk(description, actions, objects).is_none()),
             // Threads that run at the same time do not share instances, so one sequence may be checked after another.
-            Step::Parallel(sequences) => {
+            Action::Parallel(sequences) => {
                 sequences.iter().all(|sequence| walk(description, sequence, objects).is_none())
             }
-            Step::FreshProcess => {
+            Action::FreshProcess => {
                 objects.instances.clear();
                 objects.slots.clear();
                 true
             }
-            Step::Integrate(index, how) => objects.instances.get_mut(index).is_some_and(|state| {
+            Action::Integrate(index, how) => objects.instances.get_mut(index).is_some_and(|state| {
                 let is_here = !is_other_time(how.begin, state.time);
                 state.time = how.end;
                 is_here && state.mode == Mode::ContinuousTime
             }),
-            Step::Unload | Step::Quit => objects.instances.is_empty(),
-            Step::Version(_) | Step::Measure | Step::Copies(..) => true,
-            Step::Elsewhere(_) | Step::Environment => true,
+            Action::Unload | Action::Quit => objects.instances.is_empty(),
+            Action::Version(_) | Action::Measure | Action::Copies(..) => true,
+            Action::Elsewhere(_) | Action::Environment => true,
         };
         if !is_legal {
             return Some(*id);

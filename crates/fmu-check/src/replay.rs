@@ -1,6 +1,6 @@
 //! Executes the calls of a finding in a report again.
 
-use crate::call_sequence::{Arg, CallSequence, Numbered, Setting, Step, all_steps, step_name, unfold};
+use crate::call_sequence::{Action, Arg, CallSequence, Numbered, Setting, action_name, all_actions, unfold};
 use crate::checker::Checker;
 use crate::evidence::{Evidence, Replay};
 use crate::opening::opened;
@@ -99,7 +99,7 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
     let Replay { soft, now, ref evidence, .. } = *replay;
     let (limit, repetitions) = (options.limit.min(replay.limit), options.limit.min(replay.repetitions));
     let setting = Setting { soft, now, repetitions, ..checker.setting.clone() };
-    let threads = sequence.iter().any(|numbered| matches!(numbered.step, Step::Parallel(_)));
+    let threads = sequence.iter().any(|numbered| matches!(numbered.action, Action::Parallel(_)));
     let attempts = if threads { options.times.max(MOST_ATTEMPTS) } else { options.times };
     let last = last(&sequence, evidence).filter(|_| options.wait);
     let manner = last.map_or(Manner::Usual, Manner::Debugged);
@@ -176,11 +176,13 @@ fn find<'r>(report: &'r Report, wanted: &str) -> anyhow::Result<(usize, &'r Find
 fn with_token(sequence: &[Numbered], reported: &str, token: &str) -> CallSequence {
     let mut sequence = sequence.to_vec();
     for numbered in &mut sequence {
-        match &mut numbered.step {
-            Step::Make(_, make) if make.token == reported => token.clone_into(&mut make.token),
-            Step::Repeat(_, steps) | Step::Copies(_, _, steps) => *steps = with_token(steps, reported, token),
-            Step::Parallel(sequences) => {
-                sequences.iter_mut().for_each(|steps| *steps = with_token(steps, reported, token));
+        match &mut numbered.action {
+            Action::Make(_, make) if make.token == reported => token.clone_into(&mut make.token),
+            Action::Repeat(_, actions) | Action::Copies(_, _, actions) => {
+                *actions = with_token(actions, reported, token)
+            }
+            Action::Parallel(sequences) => {
+                sequences.iter_mut().for_each(|actions| *actions = with_token(actions, reported, token));
             }
             _ => {}
         }
@@ -195,14 +197,14 @@ fn check_calls(sequence: &[Numbered], standard: Standard) -> anyhow::Result<()> 
         bail!("the calls of the finding need more than {} MB with all copies and results", MOST_MEMORY >> 20);
     }
     let find = |function: &str| signatures(standard).iter().find(|signature| signature.rule.name == function);
-    for numbered in all_steps(sequence) {
-        let is_valid = match &numbered.step {
-            Step::Call { function, args, .. } => {
+    for numbered in all_actions(sequence) {
+        let is_valid = match &numbered.action {
+            Action::Call { function, args, .. } => {
                 find(function).is_some_and(|signature| signature.arguments.len() == args.len())
             }
-            Step::Parallel(sequences) => sequences.len() <= MOST_THREADS,
-            Step::Version(name) => VERSIONS.contains(&name.as_str()),
-            Step::Elsewhere(name) => {
+            Action::Parallel(sequences) => sequences.len() <= MOST_THREADS,
+            Action::Version(name) => VERSIONS.contains(&name.as_str()),
+            Action::Elsewhere(name) => {
                 !name.is_empty() && !name.contains(['/', '\\']) && name != "." && name != ".."
             }
             _ => true,
@@ -217,8 +219,9 @@ fn check_calls(sequence: &[Numbered], standard: Standard) -> anyhow::Result<()> 
 /// Checks that the FMU has a library for each interface type that is instantiated.
 fn check_libraries(sequence: &CallSequence, checker: &Checker) -> anyhow::Result<()> {
     for (index, name) in INTERFACES.into_iter().take(2).enumerate() {
-        let makes = |step: &Step| matches!(step, Step::Make(_, make) if make.co_simulation == (index == 0));
-        let is_used = all_steps(sequence).iter().any(|numbered| makes(&numbered.step));
+        let makes =
+            |action: &Action| matches!(action, Action::Make(_, make) if make.co_simulation == (index == 0));
+        let is_used = all_actions(sequence).iter().any(|numbered| makes(&numbered.action));
         if is_used && checker.setting.libraries[index].is_none() {
             let unchecked = checker.all_unchecked().into_iter().find(|unchecked| unchecked.name == name);
             let why = unchecked.map_or("the FMU does not offer it".to_owned(), |unchecked| unchecked.why);
@@ -228,7 +231,7 @@ fn check_libraries(sequence: &CallSequence, checker: &Checker) -> anyhow::Result
     Ok(())
 }
 
-/// Returns the number of bytes that the steps need, with all copies and results.
+/// Returns the number of bytes that the actions need, with all copies and results.
 fn memory_of(sequence: &[Numbered]) -> usize {
     let sum = |all: &mut dyn Iterator<Item = usize>| all.fold(0, usize::saturating_add);
     let of_arg = |arg: &Arg| match arg {
@@ -238,19 +241,20 @@ fn memory_of(sequence: &[Numbered]) -> usize {
         Arg::Out(_, count) => count.saturating_mul(WORD),
         _ => WORD,
     };
-    let of_step = |numbered: &Numbered| match &numbered.step {
-        Step::Copies(times, _, steps) => times.saturating_mul(memory_of(steps)),
-        Step::Repeat(_, steps) => memory_of(steps),
-        Step::Parallel(sequences) => sum(&mut sequences.iter().map(|steps| memory_of(steps))),
-        Step::Call { args, .. } => sum(&mut args.iter().map(of_arg)),
-        Step::Integrate(_, how) => how.states.saturating_add(how.indicators).saturating_mul(WORD),
+    let of_action = |numbered: &Numbered| match &numbered.action {
+        Action::Copies(times, _, actions) => times.saturating_mul(memory_of(actions)),
+        Action::Repeat(_, actions) => memory_of(actions),
+        Action::Parallel(sequences) => sum(&mut sequences.iter().map(|actions| memory_of(actions))),
+        Action::Call { args, .. } => sum(&mut args.iter().map(of_arg)),
+        Action::Integrate(_, how) => how.states.saturating_add(how.indicators).saturating_mul(WORD),
         _ => 0,
     };
-    STEP.saturating_add(sum(&mut sequence.iter().map(|numbered| STEP.saturating_add(of_step(numbered)))))
+    ACTION
+        .saturating_add(sum(&mut sequence.iter().map(|numbered| ACTION.saturating_add(of_action(numbered)))))
 }
 
-/// Upper bounds for the memory of a step without its arrays, and of a value in an array, in bytes.
-const STEP: usize = 256;
+/// Upper bounds for the memory of an action without its arrays, and of a value in an array, in bytes.
+const ACTION: usize = 256;
 const WORD: usize = 32;
 
 /// Maximum memory of the calls of a finding in bytes.
@@ -265,11 +269,11 @@ const MOST_ATTEMPTS: usize = 5;
 /// Functions without an argument.
 const VERSIONS: [&str; 3] = ["fmi2GetVersion", "fmi3GetVersion", "fmi2GetTypesPlatform"];
 
-/// Returns the number of the last step that the finding needs: the step during which the process ends, the last one whose results
+/// Returns the number of the last action that the finding needs: the action during which the process ends, the last one whose results
 /// are compared, or the last one of the sequence.
 fn last(sequence: &CallSequence, evidence: &Evidence) -> Option<u32> {
     let is_needed = |numbered: &&Numbered| match evidence {
-        Evidence::End(_, Some(name)) => step_name(&numbered.step) == *name,
+        Evidence::End(_, Some(name)) => action_name(&numbered.action) == *name,
         Evidence::Same(calls, _) => calls.iter().any(|call| call.id == numbered.id),
         _ => true,
     };
@@ -279,14 +283,15 @@ fn last(sequence: &CallSequence, evidence: &Evidence) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::check_calls;
-    use crate::call_sequence::{Arg, Kind, Numbered, Step};
+    use crate::call_sequence::{Action, Arg, Kind, Numbered};
     use fmi_abi::Standard;
 
     #[test]
     fn only_calls_of_fmi_are_executed() {
-        let valid =
-            |step: Step| check_calls(&[Numbered { id: 1, forbidden: false, step }], Standard::Fmi2).is_ok();
-        let call = |function: &str, args: Vec<Arg>| Step::Call {
+        let valid = |action: Action| {
+            check_calls(&[Numbered { id: 1, forbidden: false, action }], Standard::Fmi2).is_ok()
+        };
+        let call = |function: &str, args: Vec<Arg>| Action::Call {
             instance: Some(0),
             function: function.to_owned(),
             args,
@@ -294,19 +299,23 @@ mod tests {
         assert!(valid(call("fmi2Reset", Vec::new())));
         assert!(!valid(call("fmi2Reset", vec![Arg::Null])));
         assert!(!valid(call("system", Vec::new())) && !valid(call("fmi3Reset", Vec::new())));
-        assert!(valid(Step::Elsewhere("a b%".to_owned())) && !valid(Step::Elsewhere("../here".to_owned())));
-        assert!(!valid(Step::Version("abort".to_owned())));
-        assert!(valid(Step::Parallel(vec![Vec::new(); 64])) && !valid(Step::Parallel(vec![Vec::new(); 65])));
-        let numbered = |step: Step| vec![Numbered { id: 1, forbidden: false, step }];
-        let copies = |times: usize, step: Step| valid(Step::Copies(times, 1, numbered(step)));
-        assert!(copies(20, Step::Measure) && !copies(1 << 40, Step::Measure));
-        assert!(!valid(Step::Copies(1 << 40, 1, Vec::new())));
+        assert!(
+            valid(Action::Elsewhere("a b%".to_owned())) && !valid(Action::Elsewhere("../here".to_owned()))
+        );
+        assert!(!valid(Action::Version("abort".to_owned())));
+        assert!(
+            valid(Action::Parallel(vec![Vec::new(); 64])) && !valid(Action::Parallel(vec![Vec::new(); 65]))
+        );
+        let numbered = |action: Action| vec![Numbered { id: 1, forbidden: false, action }];
+        let copies = |times: usize, action: Action| valid(Action::Copies(times, 1, numbered(action)));
+        assert!(copies(20, Action::Measure) && !copies(1 << 40, Action::Measure));
+        assert!(!valid(Action::Copies(1 << 40, 1, Vec::new())));
         // Half a million copies are not too many, unless each of them has a large array.
         let set = |count| call("fmi2DeSerializeFMUstate", vec![Arg::In(Kind::U8, vec![0; count]); 3]);
         assert!(copies(1 << 19, set(1)) && !copies(1 << 19, set(100)));
         let results = |count| call("fmi2GetReal", vec![Arg::Null, Arg::Null, Arg::Out(Kind::F64, count)]);
         assert!(valid(results(1 << 20)) && !valid(results(usize::MAX)));
-        let nested = (0..8).fold(Step::Measure, |step, _| Step::Copies(20, 1, numbered(step)));
-        assert!(!valid(Step::Parallel(vec![numbered(nested)])));
+        let nested = (0..8).fold(Action::Measure, |action, _| Action::Copies(20, 1, numbered(action)));
+        assert!(!valid(Action::Parallel(vec![numbered(nested)])));
     }
 }

@@ -1,6 +1,6 @@
 //! Executes call sequences in separate processes.
 
-use crate::call_sequence::{CallSequence, End, Outcome, Run, Setting, Step};
+use crate::call_sequence::{Action, CallSequence, End, Outcome, Run, Setting};
 use crate::worker::{EXECUTED, Ended, Job, Last, OWN_FAULT, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
@@ -30,7 +30,7 @@ pub enum Manner {
     /// In processes that do not have the addresses of the usual ones. On Linux, processes that the same server forks have the same
     /// addresses, so results that depend on addresses would be equal in a repetition, but not in a later replay.
     Again,
-    /// The process with the step of this number waits for a debugger before this step, and then has no limit.
+    /// The process with the action of this number waits for a debugger before this action, and then has no limit.
     Debugged(u32),
 }
 
@@ -89,7 +89,7 @@ impl Workers {
         })
     }
 
-    /// Executes a call sequence with a limit in seconds for each process. Each `FreshProcess` step starts another process.
+    /// Executes a call sequence with a limit in seconds for each process. Each `FreshProcess` action starts another process.
     pub fn execute(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         self.execute_as(Manner::Usual, setting, sequence, limit)
     }
@@ -104,7 +104,7 @@ impl Workers {
     ) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
-        for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
+        for (phase, part) in sequence.split(|numbered| numbered.action == Action::FreshProcess).enumerate() {
             let stop_before = match manner {
                 Manner::Debugged(id) => part.iter().map(|numbered| numbered.id).find(|other| *other == id),
                 Manner::Usual | Manner::Again => None,
@@ -272,8 +272,8 @@ fn add_outcomes(
         }
     }
     // The exit of the process has no outcome, because it does not return.
-    let steps = job.sequence.iter().filter(|numbered| numbered.step != Step::Quit);
-    run.at = steps.map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
+    let actions = job.sequence.iter().filter(|numbered| numbered.action != Action::Quit);
+    run.at = actions.map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
     if let Some(bytes) = last.filter(|_| ended.code == Some(EXECUTED) && run.at.is_none()) {
         return Ok(bytes);
     }

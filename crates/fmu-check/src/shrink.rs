@@ -1,17 +1,17 @@
 //! Shortens the call sequence of a finding.
 
-use crate::call_sequence::{CallSequence, Numbered, Step, all_steps};
+use crate::call_sequence::{Action, CallSequence, Numbered, all_actions};
 use crate::description::Description;
 use crate::legal::first_illegal;
 use std::collections::{HashMap, HashSet};
 
-/// Returns the numbers of the steps, in groups. The steps of a group are only removed together, for example the calls of an
+/// Returns the numbers of the actions, in groups. The actions of a group are only removed together, for example the calls of an
 /// event.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
-        let name = match &numbered.step {
-            Step::Call { function, .. } => function.get(4..).unwrap_or_default(),
+        let name = match &numbered.action {
+            Action::Call { function, .. } => function.get(4..).unwrap_or_default(),
             _ => "",
         };
         let belongs = match name {
@@ -32,25 +32,27 @@ fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
 }
 
 /// Returns the function and the arguments of a call, or the arguments of an integration, without the instance. Returns `None` for
-/// calls that only read and for other steps.
-fn content(step: &Step) -> Option<String> {
-    match step {
-        Step::Call { function, args, .. } => {
+/// calls that only read and for other actions.
+fn content(action: &Action) -> Option<String> {
+    match action {
+        Action::Call { function, args, .. } => {
             let reads = function[4..].starts_with("Get") && !function.to_lowercase().ends_with("fmustate");
             (!reads).then(|| format!("{function} {args:?}"))
         }
-        Step::Integrate(_, how) => Some(format!("{how:?}")),
-        Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
-        Step::Make(..) | Step::Free(_) | Step::FreshProcess => None,
-        Step::Elsewhere(_) | Step::Environment | Step::Unload | Step::Quit | Step::Copies(..) => None,
+        Action::Integrate(_, how) => Some(format!("{how:?}")),
+        Action::Repeat(..) | Action::Parallel(_) | Action::Measure | Action::Version(_) => None,
+        Action::Make(..) | Action::Free(_) | Action::FreshProcess => None,
+        Action::Elsewhere(_) | Action::Environment | Action::Unload | Action::Quit | Action::Copies(..) => {
+            None
+        }
     }
 }
 
-/// Returns the sequence without the steps with these numbers, some of which may be steps of its threads.
+/// Returns the sequence without the actions with these numbers, some of which may be actions of its threads.
 fn without(sequence: &[Numbered], ids: &HashSet<u32>) -> CallSequence {
     let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
-        if let Step::Parallel(sequences) = &mut numbered.step {
+        if let Action::Parallel(sequences) = &mut numbered.action {
             sequences.iter_mut().for_each(|sequence| *sequence = without(sequence, ids));
         }
         numbered
@@ -61,9 +63,9 @@ fn without(sequence: &[Numbered], ids: &HashSet<u32>) -> CallSequence {
 /// Joins the units that have the same calls, because these calls may belong to compared simulations, whose results would differ
 /// if only one of them lacked a call.
 fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let contents: HashMap<u32, String> = all_steps(sequence)
+    let contents: HashMap<u32, String> = all_actions(sequence)
         .into_iter()
-        .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
+        .filter_map(|numbered| Some((numbered.id, content(&numbered.action)?)))
         .collect();
     let (mut groups, mut known) = (Vec::<Vec<u32>>::new(), HashMap::<Vec<&String>, usize>::new());
     for unit in units {
@@ -80,7 +82,7 @@ fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 }
 
 /// Returns the shortest sequence found that still satisfies `reproduces` and, if the standard allows the original sequence, is
-/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the steps `FreshProcess`,
+/// allowed, too. Calls of `pinned` functions are not removed; if `pinned` is not empty, neither are the actions `FreshProcess`,
 /// `Elsewhere` and `Environment`. If `compared` is set, corresponding calls of compared simulations are removed together. The search ends when
 /// `reproduces` returns `None`.
 pub fn shrink(
@@ -92,18 +94,18 @@ pub fn shrink(
 ) -> CallSequence {
     let legal = first_illegal(description, sequence).is_none();
     let mut best = sequence.clone();
-    let threads = sequence.iter().flat_map(|numbered| match &numbered.step {
-        Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| units(sequence)).collect(),
+    let threads = sequence.iter().flat_map(|numbered| match &numbered.action {
+        Action::Parallel(sequences) => sequences.iter().flat_map(|sequence| units(sequence)).collect(),
         _ => Vec::new(),
     });
     let all: Vec<Vec<u32>> = units(sequence).into_iter().chain(threads).collect();
     let mut units = if compared { together(sequence, all) } else { all };
-    let stays = |step: &Step| match step {
-        Step::Call { function, .. } => pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name)),
-        Step::FreshProcess | Step::Elsewhere(_) | Step::Environment => !pinned.is_empty(),
+    let stays = |action: &Action| match action {
+        Action::Call { function, .. } => pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name)),
+        Action::FreshProcess | Action::Elsewhere(_) | Action::Environment => !pinned.is_empty(),
         _ => false,
     };
-    let all = all_steps(sequence).into_iter().filter(|numbered| stays(&numbered.step));
+    let all = all_actions(sequence).into_iter().filter(|numbered| stays(&numbered.action));
     let staying: HashSet<u32> = all.map(|numbered| numbered.id).collect();
     units.retain(|unit| !unit.iter().any(|id| staying.contains(id)));
     let mut size = units.len() / 2;
@@ -114,7 +116,7 @@ pub fn shrink(
             let begin = end.saturating_sub(size);
             let tried = without(&best, &units[begin..end].iter().flatten().copied().collect());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && all_steps(&tried).len() < all_steps(&best).len() {
+            if keeps && all_actions(&tried).len() < all_actions(&best).len() {
                 match reproduces(&tried) {
                     None => return best,
                     Some(false) => {}
@@ -137,7 +139,7 @@ pub fn shrink(
 #[cfg(test)]
 mod tests {
     use super::shrink;
-    use crate::call_sequence::{CallSequence, Kind, Numbered, Step, Values, all_steps};
+    use crate::call_sequence::{Action, CallSequence, Kind, Numbered, Values, all_actions};
     use crate::description::Description;
     use crate::legal::first_illegal;
     use crate::writer::Part::{Begin, Free, ReadAll, Run};
@@ -163,9 +165,9 @@ mod tests {
     const WHOLE: &[crate::writer::Part] = &[Begin, ReadAll, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
-        all_steps(sequence)
+        all_actions(sequence)
             .into_iter()
-            .map(|numbered| crate::call_sequence::step_name(&numbered.step))
+            .map(|numbered| crate::call_sequence::action_name(&numbered.action))
             .collect()
     }
 
@@ -205,11 +207,11 @@ mod tests {
         thread.write(1, WHOLE);
         writer.join(vec![thread]);
         let parallel = |sequence: &CallSequence| {
-            matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
+            matches!(sequence.last(), Some(Numbered { action: Action::Parallel(_), .. }))
         };
         let reproduces = |tried: &CallSequence| Some(parallel(tried) && count(tried, "fmi2DoStep") >= 4);
         let short = shrink(&description, &writer.sequence, &[], true, reproduces);
-        let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
+        let Some(Action::Parallel(threads)) = short.last().map(|numbered| &numbered.action) else {
             panic!("{short:?}")
         };
         let single = short[..short.len() - 1].to_vec();

@@ -1,6 +1,6 @@
 //! Finds a successful simulation, which most checks vary.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Values, step_name, step_of};
+use crate::call_sequence::{Action, CallSequence, End, Run, Values, action_name, action_of};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Event, ending, failure, failure_of};
@@ -108,8 +108,9 @@ fn is_fatal(run: &Run, ids: &[u32]) -> bool {
 /// Returns the number of steps before the first that fails, has an event, returns early or ends the simulation, and whether that
 /// step returned Discard.
 fn successful_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
-    let step = |step: &Step| matches!(step, Step::Call { function, .. } if function.ends_with("DoStep"));
-    let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
+    let is_step =
+        |action: &Action| matches!(action, Action::Call { function, .. } if function.ends_with("DoStep"));
+    let ids = sequence.iter().filter(|numbered| is_step(&numbered.action)).map(|numbered| numbered.id);
     let mut succeeded = 0;
     for id in ids {
         let flags = run.outcome(id).map_or(&[][..], |outcome| &outcome.written);
@@ -175,7 +176,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
         }
         let advances = |id: &&u32| {
-            let name = step_of(&writer.sequence, **id).map(|numbered| step_name(&numbered.step));
+            let name = action_of(&writer.sequence, **id).map(|numbered| action_name(&numbered.action));
             name.is_some_and(|name| name.ends_with("DoStep") || name.ends_with("CompletedIntegratorStep"))
         };
         // The results are flags for an event, the end of the simulation and, in Co-Simulation, an early return.

@@ -37,7 +37,7 @@ pub const WRIST: [&str; 3] = [
 /// assert!(prw_page::testbed(&description).unwrap().contains("<a href=\"manual.html#equations\">"));
 /// ```
 pub fn testbed(description: &str) -> Result<String> {
-    page("testbed", Part::First, description)
+    page("testbed", Extent::First, description)
 }
 
 /// Returns the testbed's manual for the FMU with this model description of FMI 2.0.
@@ -50,7 +50,7 @@ pub fn testbed(description: &str) -> Result<String> {
 /// assert!(prw_page::manual(&description).unwrap().contains("<td><code>theta1</code></td><td>rad</td>"));
 /// ```
 pub fn manual(description: &str) -> Result<String> {
-    page("testbed", Part::Manual, description)
+    page("testbed", Extent::Manual, description)
 }
 
 /// Returns the controller's page for the FMU with this model description of FMI 2.0.
@@ -63,12 +63,12 @@ pub fn manual(description: &str) -> Result<String> {
 /// assert!(prw_page::controller(&description).unwrap().contains("<td><code>pitch_ref</code></td><td>rad</td>"));
 /// ```
 pub fn controller(description: &str) -> Result<String> {
-    page("controller", Part::Whole, description)
+    page("controller", Extent::Whole, description)
 }
 
-/// The part of a document that a page contains.
+/// The sections of a document that a page contains.
 #[derive(Clone, Copy, PartialEq)]
-enum Part {
+enum Extent {
     Whole,
     /// The first section, and links to the others.
     First,
@@ -86,7 +86,7 @@ struct Section {
 }
 
 /// Builds a page from the files in one directory of `text` and from the model description.
-fn page(directory: &str, part: Part, description: &str) -> Result<String> {
+fn page(directory: &str, extent: Extent, description: &str) -> Result<String> {
     let document = Document::parse(description).context("the model description is not XML")?;
     let root = document.root_element();
     let attribute = |name| root.attribute(name).unwrap_or_default();
@@ -98,13 +98,13 @@ fn page(directory: &str, part: Part, description: &str) -> Result<String> {
     let links = |sections: &[Section], page: &str| -> Vec<(String, String)> {
         sections.iter().map(|one| (format!("{page}#{}", one.anchor), one.title.clone())).collect()
     };
-    let (sections, links) = match part {
-        Part::Whole => (all, links(all, "")),
-        Part::First => (first, [links(first, ""), links(rest, "manual.html")].concat()),
-        Part::Manual => (rest, links(rest, "")),
+    let (sections, links) = match extent {
+        Extent::Whole => (all, links(all, "")),
+        Extent::First => (first, [links(first, ""), links(rest, "manual.html")].concat()),
+        Extent::Manual => (rest, links(rest, "")),
     };
-    let (title, lead) = match part {
-        Part::Manual => (
+    let (title, lead) = match extent {
+        Extent::Manual => (
             format!("{}: the manual", header.title),
             "<p><a href=\"index.html\">The machine, and this FMU running in the browser</a></p>".to_owned(),
         ),

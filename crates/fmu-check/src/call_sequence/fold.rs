@@ -1,15 +1,15 @@
 //! Writes calls that are repeated only once, because threads repeat whole simulations: a report with every call in full would have
 //! tens of thousands of lines.
 
-use super::{CallSequence, Numbered, Step};
+use super::{Action, CallSequence, Numbered};
 
-/// Number of steps that copies must save; fewer are easier to read in full.
+/// Number of actions that copies must save; fewer are easier to read in full.
 const LEAST_SAVED: usize = 16;
 
-/// Maximum number of steps of a copy.
+/// Maximum number of actions of a copy.
 const LONGEST: usize = 2000;
 
-/// Returns a sequence in which copies of steps are replaced by `Step::Copies`, also within its threads.
+/// Returns a sequence in which copies of actions are replaced by `Action::Copies`, also within its threads.
 pub fn fold(sequence: &[Numbered]) -> CallSequence {
     let mut folded = Vec::new();
     let mut begin = 0;
@@ -21,18 +21,18 @@ pub fn fold(sequence: &[Numbered]) -> CallSequence {
             .max_by_key(|(length, times)| length * (times - 1));
         match best {
             Some((length, times)) if length * (times - 1) >= LEAST_SAVED => {
-                let copies = Step::Copies(times, rest[length].id - first.id, fold(&rest[..length]));
-                folded.push(Numbered { id: first.id, forbidden: false, step: copies });
+                let copies = Action::Copies(times, rest[length].id - first.id, fold(&rest[..length]));
+                folded.push(Numbered { id: first.id, forbidden: false, action: copies });
                 begin += length * times;
             }
             _ => {
-                let step = match &first.step {
-                    Step::Parallel(sequences) => {
-                        Step::Parallel(sequences.iter().map(|sequence| fold(sequence)).collect())
+                let action = match &first.action {
+                    Action::Parallel(sequences) => {
+                        Action::Parallel(sequences.iter().map(|sequence| fold(sequence)).collect())
                     }
-                    step => step.clone(),
+                    action => action.clone(),
                 };
-                folded.push(Numbered { step, ..first.clone() });
+                folded.push(Numbered { action, ..first.clone() });
                 begin += 1;
             }
         }
@@ -40,15 +40,15 @@ pub fn fold(sequence: &[Numbered]) -> CallSequence {
     folded
 }
 
-/// Returns the number of copies of the first `length` steps at the beginning of a sequence; `None` if there is only one. The
-/// numbers of the steps increase by the same difference from copy to copy.
+/// Returns the number of copies of the first `length` actions at the beginning of a sequence; `None` if there is only one. The
+/// numbers of the actions increase by the same difference from copy to copy.
 fn copies(sequence: &[Numbered], length: usize) -> Option<usize> {
     let stride = sequence[length].id.checked_sub(sequence[0].id)?;
     let same = |(one, other): &(&Numbered, &Numbered)| {
         Some(other.id) == one.id.checked_add(stride)
             && one.forbidden == other.forbidden
-            && one.step == other.step
-            && !matches!(one.step, Step::Parallel(_) | Step::Repeat(..))
+            && one.action == other.action
+            && !matches!(one.action, Action::Parallel(_) | Action::Repeat(..))
     };
     let equal = sequence.iter().zip(&sequence[length..]).take_while(same).count();
     (equal >= length).then_some(1 + equal / length)
@@ -58,19 +58,21 @@ fn copies(sequence: &[Numbered], length: usize) -> Option<usize> {
 pub fn unfold(sequence: &[Numbered]) -> CallSequence {
     let mut all = Vec::new();
     for numbered in sequence {
-        match &numbered.step {
-            Step::Copies(times, stride, steps) => {
-                let steps = unfold(steps);
+        match &numbered.action {
+            Action::Copies(times, stride, actions) => {
+                let actions = unfold(actions);
                 for copy in 0..*times {
                     let by = stride.saturating_mul(u32::try_from(copy).unwrap_or(u32::MAX));
                     all.extend(
-                        steps.iter().map(|step| Numbered { id: step.id.saturating_add(by), ..step.clone() }),
+                        actions
+                            .iter()
+                            .map(|action| Numbered { id: action.id.saturating_add(by), ..action.clone() }),
                     );
                 }
             }
-            Step::Parallel(sequences) => {
-                let step = Step::Parallel(sequences.iter().map(|sequence| unfold(sequence)).collect());
-                all.push(Numbered { step, ..numbered.clone() });
+            Action::Parallel(sequences) => {
+                let action = Action::Parallel(sequences.iter().map(|sequence| unfold(sequence)).collect());
+                all.push(Numbered { action, ..numbered.clone() });
             }
             _ => all.push(numbered.clone()),
         }
@@ -81,24 +83,24 @@ pub fn unfold(sequence: &[Numbered]) -> CallSequence {
 #[cfg(test)]
 mod tests {
     use super::{fold, unfold};
-    use crate::call_sequence::{Numbered, Step};
+    use crate::call_sequence::{Action, Numbered};
 
     /// Checks that repeated simulations on threads are folded, that a single call within them stays, and that nothing is lost.
     #[test]
     fn copies_are_written_once() {
-        let numbered = |id: u32, step: Step| Numbered { id, forbidden: false, step };
+        let numbered = |id: u32, action: Action| Numbered { id, forbidden: false, action };
         let simulation = |id: u32| -> Vec<Numbered> {
-            (0..5).map(|index| numbered(id + index, Step::Free(index as usize))).collect()
+            (0..5).map(|index| numbered(id + index, Action::Free(index as usize))).collect()
         };
         let thread: Vec<Numbered> = (0..20)
             .flat_map(|copy| simulation(10 + 5 * copy))
-            .chain([numbered(500, Step::Measure)])
+            .chain([numbered(500, Action::Measure)])
             .collect();
-        let sequence = vec![numbered(0, Step::Unload), numbered(1, Step::Parallel(vec![thread]))];
+        let sequence = vec![numbered(0, Action::Unload), numbered(1, Action::Parallel(vec![thread]))];
         let folded = fold(&sequence);
-        let Step::Parallel(threads) = &folded[1].step else { panic!("{folded:?}") };
+        let Action::Parallel(threads) = &folded[1].action else { panic!("{folded:?}") };
         let [copies, last] = &threads[0][..] else { panic!("{threads:?}") };
-        assert_eq!(copies.step, Step::Copies(20, 5, simulation(10)));
+        assert_eq!(copies.action, Action::Copies(20, 5, simulation(10)));
         assert_eq!(last.id, 500);
         assert_eq!(unfold(&folded), sequence);
     }

@@ -154,9 +154,9 @@ pub struct Integration {
 /// Index that represents a NULL instance, which may be freed.
 pub const NULL_INSTANCE: usize = 999;
 
-/// Step of a call sequence.
+/// Action of a call sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Step {
+pub enum Action {
     /// Instantiates the FMU; the instance gets this index.
     Make(usize, Make),
     Free(usize),
@@ -170,76 +170,79 @@ pub enum Step {
     Version(String),
     /// Integrates an instance of Model Exchange and handles its events.
     Integrate(usize, Integration),
-    /// Repeats steps this many times, or until `Setting::repetitions` seconds have passed.
+    /// Repeats actions this many times, or until `Setting::repetitions` seconds have passed.
     Repeat(usize, Vec<Numbered>),
     /// Runs call sequences at the same time, each in a separate thread.
     Parallel(Vec<Vec<Numbered>>),
-    /// Copies of steps, only in reports: their number, the difference between the numbers of a step in two successive copies,
-    /// and the steps of the first copy.
+    /// Copies of actions, only in reports: their number, the difference between the numbers of an action in two successive copies,
+    /// and the actions of the first copy.
     Copies(usize, u32, Vec<Numbered>),
     /// Measures memory, threads, open files and settings of the process.
     Measure,
     /// Continues in a new process. Only the serialized states are passed on to it.
     FreshProcess,
-    /// Places the FMU in a directory with this name. It can only be the first step of a process, because the library is loaded from there.
+    /// Places the FMU in a directory with this name. It can only be the first action of a process, because the library is loaded from there.
     Elsewhere(String),
-    /// Uses another working directory, home directory, language and time zone. It can only be the first step of a process.
+    /// Uses another working directory, home directory, language and time zone. It can only be the first action of a process.
     Environment,
     Unload,
-    /// Exits the process, which runs the destructors of its libraries. This is the last step of a sequence.
+    /// Exits the process, which runs the destructors of its libraries. This is the last action of a sequence.
     Quit,
 }
 
-/// Step with a number that does not change when other steps are removed.
+/// Action with a number that does not change when other actions are removed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
     pub id: u32,
     /// Whether the standard forbids the call or its arguments. The state machine of `legal` ignores forbidden calls.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub forbidden: bool,
-    pub step: Step,
+    #[serde(rename = "step")]
+    pub action: Action,
 }
 
-/// Steps in the order of their execution.
+/// Actions in the order of their execution.
 pub type CallSequence = Vec<Numbered>;
 
-/// Returns all steps of a sequence, including the steps within its repetitions and threads.
-pub fn all_steps(sequence: &[Numbered]) -> Vec<&Numbered> {
-    let steps = sequence.iter().flat_map(|numbered| {
-        let inner = match &numbered.step {
-            Step::Repeat(_, steps) | Step::Copies(_, _, steps) => all_steps(steps),
-            Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| all_steps(sequence)).collect(),
+/// Returns all actions of a sequence, including the actions within its repetitions and threads.
+pub fn all_actions(sequence: &[Numbered]) -> Vec<&Numbered> {
+    let actions = sequence.iter().flat_map(|numbered| {
+        let inner = match &numbered.action {
+            Action::Repeat(_, actions) | Action::Copies(_, _, actions) => all_actions(actions),
+            Action::Parallel(sequences) => {
+                sequences.iter().flat_map(|sequence| all_actions(sequence)).collect()
+            }
             _ => Vec::new(),
         };
         std::iter::once(numbered).chain(inner)
     });
-    steps.collect()
+    actions.collect()
 }
 
-/// Returns the step with this number.
-pub fn step_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
-    all_steps(sequence).into_iter().find(|numbered| numbered.id == id)
+/// Returns the action with this number.
+pub fn action_of(sequence: &[Numbered], id: u32) -> Option<&Numbered> {
+    all_actions(sequence).into_iter().find(|numbered| numbered.id == id)
 }
 
-/// Returns a short description of a step.
-pub fn step_name(step: &Step) -> String {
-    match step {
-        Step::Make(..) => "the instantiation".to_owned(),
-        Step::Free(_) => "FreeInstance".to_owned(),
-        Step::Call { function, .. } | Step::Version(function) => function.clone(),
-        Step::Repeat(times, steps) => format!(
+/// Returns a short description of an action.
+pub fn action_name(action: &Action) -> String {
+    match action {
+        Action::Make(..) => "the instantiation".to_owned(),
+        Action::Free(_) => "FreeInstance".to_owned(),
+        Action::Call { function, .. } | Action::Version(function) => function.clone(),
+        Action::Repeat(times, actions) => format!(
             "one of {times} repetitions of {}",
-            steps.first().map_or("nothing".to_owned(), |numbered| step_name(&numbered.step))
+            actions.first().map_or("nothing".to_owned(), |numbered| action_name(&numbered.action))
         ),
-        Step::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
-        Step::Integrate(..) => "an integration".to_owned(),
-        Step::Copies(times, ..) => format!("one of {times} copies of calls"),
-        Step::Measure => "a measurement".to_owned(),
-        Step::FreshProcess => "a fresh process".to_owned(),
-        Step::Elsewhere(_) => "another directory".to_owned(),
-        Step::Environment => "another environment".to_owned(),
-        Step::Unload => "unloading the library".to_owned(),
-        Step::Quit => "the exit of the process".to_owned(),
+        Action::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
+        Action::Integrate(..) => "an integration".to_owned(),
+        Action::Copies(times, ..) => format!("one of {times} copies of calls"),
+        Action::Measure => "a measurement".to_owned(),
+        Action::FreshProcess => "a fresh process".to_owned(),
+        Action::Elsewhere(_) => "another directory".to_owned(),
+        Action::Environment => "another environment".to_owned(),
+        Action::Unload => "unloading the library".to_owned(),
+        Action::Quit => "the exit of the process".to_owned(),
     }
 }
 
@@ -257,6 +260,6 @@ pub struct Setting {
     pub soft: bool,
     /// Whether the loader resolves all symbols when it loads the library, as in some importers.
     pub now: bool,
-    /// Maximum duration of a `Repeat` step in seconds.
+    /// Maximum duration of a `Repeat` action in seconds.
     pub repetitions: f64,
 }

@@ -107,7 +107,7 @@ impl Values {
     }
 }
 
-/// Result of a step.
+/// Result of an action.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     pub id: u32,
@@ -118,7 +118,7 @@ pub struct Outcome {
     pub missing: bool,
     /// Contents of the arrays for results, in the order of the arguments.
     pub written: Vec<Values>,
-    /// Messages that the FMU logged during the step.
+    /// Messages that the FMU logged during the action.
     pub log: Vec<Message>,
     /// Messages that the FMU logged with an environment pointer that no instance has received.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -149,14 +149,14 @@ pub struct Measured {
 /// End of the process that executed a call sequence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum End {
-    /// The last step returned.
+    /// The last action returned.
     #[default]
     Done,
     /// The process crashed, for this reason.
     Crash(String),
     /// The process did not end within this limit in seconds.
     Hang(f64),
-    /// The process exited before the last step returned, with this status.
+    /// The process exited before the last action returned, with this status.
     Exit(i32),
     /// The library cannot be loaded, for this reason.
     Unloadable(String),
@@ -167,10 +167,10 @@ pub enum End {
 /// Result of a call sequence.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// Results by the number of the step. They are shared, because the search for evidence copies a run many times.
+    /// Results by the number of the action. They are shared, because the search for evidence copies a run many times.
     pub outcomes: HashMap<u32, Arc<Outcome>>,
     pub end: End,
-    /// Number of the first step without a result, in which the process ended; `None` if all steps have results.
+    /// Number of the first action without a result, in which the process ended; `None` if all actions have results.
     pub at: Option<u32>,
     /// Output on the standard output and the standard error.
     pub output: String,
@@ -192,7 +192,7 @@ impl Run {
         self.status(id).is_some_and(|status| status <= 1)
     }
 
-    /// Returns the contents of the first array for results of a step.
+    /// Returns the contents of the first array for results of an action.
     pub fn written(&self, id: u32) -> Option<&Values> {
         self.outcome(id)?.written.first()
     }

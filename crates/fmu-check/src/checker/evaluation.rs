@@ -1,15 +1,15 @@
-//! Evaluates runs: finds violations of rules, and processes that ended before the last step returned.
+//! Evaluates runs: finds violations of rules, and processes that ended before the last action returned.
 
 use super::{Checker, at};
 use crate::always;
-use crate::call_sequence::{CallSequence, End, Run, Setting, step_name};
+use crate::call_sequence::{CallSequence, End, Run, Setting, action_name};
 use crate::finding::{Criterion, Event, Finding, Severity, SharedCriterion, ending, event};
 use crate::rules;
 use crate::writer::{Read, difference};
 use std::sync::Arc;
 
 impl Checker {
-    /// Records a finding if a run breaks a rule; returns whether it does. Returns false for a run that ended before its last step
+    /// Records a finding if a run breaks a rule; returns whether it does. Returns false for a run that ended before its last action
     /// returned.
     pub fn record(&self, name: &str, run: &Run, sequence: &CallSequence, criterion: impl Criterion) -> bool {
         let observed = if run.end == End::Done { criterion(run) } else { None };
@@ -29,7 +29,7 @@ impl Checker {
         always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
-    /// Executes a call sequence and records its findings: the end of the process or, if the last step returned, the violations
+    /// Executes a call sequence and records its findings: the end of the process or, if the last action returned, the violations
     /// of `criterion` and of the rules that hold for every run.
     pub fn evaluate(
         &self,
@@ -108,7 +108,7 @@ impl Checker {
         }
     }
 
-    /// Records the finding of a run that ended before its last step returned, unless this machine is the reason.
+    /// Records the finding of a run that ended before its last action returned, unless this machine is the reason.
     fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, forbidden: bool) -> anyhow::Result<()> {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         if self.lacks(run).is_some() {
@@ -117,7 +117,7 @@ impl Checker {
         let ends: SharedCriterion = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
             let name_at =
-                |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
+                |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| action_name(&at.action));
             let at = name_at(run, &sequence);
             let floods = matches!(run.end, End::Flood(_));
             Arc::new(move |run: &Run| {

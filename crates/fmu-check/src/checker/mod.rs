@@ -4,7 +4,7 @@ mod evaluation;
 mod proofs;
 mod records;
 
-use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step, step_name, step_of};
+use crate::call_sequence::{Action, CallSequence, End, Numbered, Run, Setting, action_name, action_of};
 use crate::description::Description;
 use crate::finding::Finding;
 use crate::legal::first_illegal;
@@ -24,9 +24,9 @@ const QUICK: f64 = 30.0;
 /// Fraction of the duration that is for the checks. The rest is for shortening and repeating the call sequences of findings.
 const CHECKS: f64 = 0.8;
 
-/// Returns the step in which the process of a run ended; `None` if its last step returned.
+/// Returns the action in which the process of a run ended; `None` if its last action returned.
 fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
-    step_of(sequence, run.at?)
+    action_of(sequence, run.at?)
 }
 
 /// State of the check of an FMU.
@@ -119,14 +119,14 @@ impl Checker {
         Writer::new(&self.description, trajectory, &self.readable)
     }
 
-    /// Returns a call sequence that has only this step.
-    pub fn step(&self, step: Step, forbidden: bool) -> CallSequence {
-        vec![Numbered { id: 0, forbidden, step }]
+    /// Returns a call sequence that has only this action.
+    pub fn only(&self, action: Action, forbidden: bool) -> CallSequence {
+        vec![Numbered { id: 0, forbidden, action }]
     }
 
-    /// Returns a step that reads the FMI version, for which the library must be loaded.
-    pub fn version(&self) -> Step {
-        Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
+    /// Returns an action that reads the FMI version, for which the library must be loaded.
+    pub fn version(&self) -> Action {
+        Action::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
 
     /// Returns `count`, or an eighth of it (rounded up) in a quick check.
@@ -190,7 +190,8 @@ impl Checker {
         // The machine may be busy, so a suspected hang is repeated with no other call sequence at the same time and three times
         // the limit. If the function does not return then either, its next hang is not repeated.
         let name = |run: &Run| {
-            at(sequence, run).map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
+            at(sequence, run)
+                .map_or(String::new(), |at| format!("{}{}", action_name(&at.action), at.forbidden))
         };
         if !matches!(run.end, End::Hang(_)) || locked(&self.hung).contains(&name(&run)) {
             return Ok(run);
@@ -214,10 +215,10 @@ impl Checker {
         }
     }
 
-    /// Describes the first step that the standard does not allow. Only a mistake in fmu-check leads to such a step.
+    /// Describes the first action that the standard does not allow. Only a mistake in fmu-check leads to such an action.
     fn illegal(&self, sequence: &CallSequence) -> Option<String> {
         let id = first_illegal(&self.description, sequence)?;
-        Some(format!("{id} {:?}", step_of(sequence, id)?.step))
+        Some(format!("{id} {:?}", action_of(sequence, id)?.action))
     }
 
     /// Returns the number of call sequences that were executed.

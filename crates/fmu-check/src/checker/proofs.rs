@@ -1,7 +1,7 @@
 //! Proves findings: shortens the call sequence of a finding, and executes it twice, each time in new processes.
 
 use super::Checker;
-use crate::call_sequence::{CallSequence, End, Run, Setting, Step};
+use crate::call_sequence::{Action, CallSequence, End, Run, Setting};
 use crate::evidence::Evidence;
 use crate::finding::{Finding, Proof};
 use crate::reproduce;
@@ -57,7 +57,7 @@ impl Checker {
     /// Repeats the calls of a finding. A finding that they do not show again becomes a note. Ends at the instant `until`.
     pub fn prove(&self, finding: &mut Finding, until: Instant) {
         if finding.criterion.is_some() {
-            finding.steps = (finding.sequence.len(), finding.sequence.len());
+            finding.length = (finding.sequence.len(), finding.sequence.len());
             let proof = self.proof(finding, until);
             finding.judge(proof);
         }
@@ -130,7 +130,7 @@ impl Checker {
         shows: impl Fn(&Run) -> bool,
     ) -> anyhow::Result<Option<Run>> {
         let limit = self.reproducing_limit(finding);
-        let threads = finding.sequence.iter().any(|numbered| matches!(numbered.step, Step::Parallel(_)));
+        let threads = finding.sequence.iter().any(|numbered| matches!(numbered.action, Action::Parallel(_)));
         for _ in 0..if threads { 3 } else { 1 } {
             let remaining = until.saturating_duration_since(Instant::now()).as_secs_f64();
             if remaining <= 0.0 {
@@ -185,7 +185,7 @@ impl Checker {
             (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
         finding.observed = observed;
-        finding.steps.1 = short.len();
+        finding.length.1 = short.len();
         finding.sequence = short;
     }
 }

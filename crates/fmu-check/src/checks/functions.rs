@@ -1,7 +1,7 @@
 //! Checks the exported functions, the version, and the functions of declared capabilities.
 
 use super::derivatives::{references, request_derivatives, unknown_and_known};
-use crate::call_sequence::{End, Run, Setting, Step};
+use crate::call_sequence::{Action, End, Run, Setting};
 use crate::checker::Checker;
 use crate::finding::fails;
 use crate::writer::{Part, Trajectory};
@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Checks that the loader can resolve all symbols when it loads the library. By default, it resolves a function when the
 /// function is first called.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
-    let sequence = checker.step(checker.version(), false);
+    let sequence = checker.only(checker.version(), false);
     let [lazy, immediate] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
         checker.workers.execute(&setting, &sequence, checker.limit)
@@ -63,9 +63,9 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
 
 /// Checks the version and, in FMI 2.0, the platform.
 fn version(checker: &Checker) -> anyhow::Result<()> {
-    let mut sequence = checker.step(checker.version(), false);
+    let mut sequence = checker.only(checker.version(), false);
     if !checker.fmi3() {
-        let mut platform = checker.step(Step::Version("fmi2GetTypesPlatform".to_owned()), false);
+        let mut platform = checker.only(Action::Version("fmi2GetTypesPlatform".to_owned()), false);
         platform[0].id = 1;
         sequence.extend(platform);
     }

@@ -2,7 +2,7 @@
 //! time. Also checks the events of Model Exchange.
 
 use super::Fits::{self, Always, Integrated, Several, Stepped};
-use crate::call_sequence::{Arg, NULL_INSTANCE, Run, Step};
+use crate::call_sequence::{Action, Arg, NULL_INSTANCE, Run};
 use crate::checker::Checker;
 use crate::description::Variable;
 use crate::finding::{event, first_failure};
@@ -132,7 +132,7 @@ pub fn sequences(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<(
 
 /// Checks that FreeInstance ignores NULL.
 pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
-    checker.check("life_cycle.free-null", checker.step(Step::Free(NULL_INSTANCE), true), |_| None)
+    checker.check("life_cycle.free-null", checker.only(Action::Free(NULL_INSTANCE), true), |_| None)
 }
 
 /// Checks that a step beyond the stop time fails.
@@ -153,11 +153,13 @@ fn beyond_stop_time(checker: &Checker, trajectory: &Trajectory) -> anyhow::Resul
 
 /// Checks that, after all instances were freed, the library can be unloaded and loaded again, and the process can exit.
 fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    for (name, step, times) in [("life_cycle.unload", Step::Unload, 2), ("life_cycle.exit", Step::Quit, 1)] {
+    for (name, action, times) in
+        [("life_cycle.unload", Action::Unload, 2), ("life_cycle.exit", Action::Quit, 1)]
+    {
         let mut writer = checker.writer(trajectory);
         for _ in 0..times {
             writer.write(0, &[Begin, Points(2), TERMINATE, Free]);
-            writer.add(step.clone());
+            writer.add(action.clone());
         }
         checker.check(name, writer.sequence, |_| None)?;
     }

@@ -1,6 +1,6 @@
 //! Checks that an FMU runs in directories whose names have a space or other characters that a URI must encode.
 
-use crate::call_sequence::{Run, Step};
+use crate::call_sequence::{Action, Run};
 use crate::checker::Checker;
 use crate::finding::failure;
 use crate::writer::Part::{Begin, ReadAll, Run as RunFrom};
@@ -15,8 +15,8 @@ pub fn location(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()
     for name in NAMES {
         let mut writer = checker.writer(trajectory);
         let usual = writer.write(0, &[Begin, ReadAll, RunFrom(0)]);
-        writer.add(Step::FreshProcess);
-        writer.add(Step::Elsewhere(name.to_owned()));
+        writer.add(Action::FreshProcess);
+        writer.add(Action::Elsewhere(name.to_owned()));
         let moved = writer.write(0, &[Begin, ReadAll, RunFrom(0)]);
         let sequence = writer.sequence.clone();
         // Strings may contain the path.

@@ -1,6 +1,6 @@
 //! Checks that an FMU leaks no memory, threads or files, changes no settings of the process, and prints nothing.
 
-use crate::call_sequence::{End, Measured, Run, Step, Values};
+use crate::call_sequence::{Action, End, Measured, Run, Values};
 use crate::checker::Checker;
 use crate::finding::failure;
 use crate::worker::{EVALUATED, changed_setting, tolerated_growth};
@@ -59,7 +59,7 @@ const WARM_UP: usize = 200;
 /// Maximum number of repetitions between the measurements.
 const REPETITIONS: usize = 10_000;
 
-/// Numbers of the steps of a check for leaks.
+/// Numbers of the actions of a check for leaks.
 #[derive(Clone, Copy)]
 struct Measurements {
     warm_up: u32,
@@ -88,12 +88,12 @@ fn check_leaks(
 ) -> anyhow::Result<()> {
     let begin = writer.sequence.len();
     cycle(&mut writer);
-    let steps = writer.sequence.split_off(begin);
+    let cycle = writer.sequence.split_off(begin);
     let measurements = Measurements {
-        warm_up: writer.add(Step::Repeat(WARM_UP, steps.clone())),
-        before: writer.add(Step::Measure),
-        repetitions: writer.add(Step::Repeat(REPETITIONS, steps.clone())),
-        after: writer.add(Step::Measure),
+        warm_up: writer.add(Action::Repeat(WARM_UP, cycle.clone())),
+        before: writer.add(Action::Measure),
+        repetitions: writer.add(Action::Repeat(REPETITIONS, cycle.clone())),
+        after: writer.add(Action::Measure),
     };
     let sequence = writer.sequence;
     let run = checker.execute_for(&sequence, checker.setting.repetitions * 8.0 + checker.limit)?;
@@ -116,10 +116,10 @@ fn check_leaks(
             Some(format!("{more} {are_left} after {times} {what}"))
         });
     }
-    let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
+    let ids: Vec<u32> = cycle.iter().map(|numbered| numbered.id).collect();
     checker.record("resources.cycles", &run, &sequence, move |run| {
         let times = run.outcome(measurements.repetitions)?.measured.as_ref()?.times;
-        let why = failure(&steps, run, &ids)?;
+        let why = failure(&cycle, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
     Ok(())
@@ -136,11 +136,11 @@ fn leaked_memory((before, after, times): (Measured, Measured, usize), what: &str
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.add(checker.version());
-    let first = writer.add(Step::Measure);
+    let first = writer.add(Action::Measure);
     writer.write(0, &[Begin, Points(usize::MAX), ReadAll]);
-    let alive = writer.add(Step::Measure);
+    let alive = writer.add(Action::Measure);
     writer.write(0, &[Call("Terminate"), Free]);
-    let freed = writer.add(Step::Measure);
+    let freed = writer.add(Action::Measure);
     checker.check("resources.settings", writer.sequence, move |run| {
         let measured = |id| run.outcome(id)?.measured.as_ref();
         let before = measured(first)?;
@@ -154,7 +154,7 @@ fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
 fn printed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     writer.write(0, &[Begin, Points(usize::MAX), ReadAll, Call("Terminate"), Free]);
-    writer.add(Step::Unload);
+    writer.add(Action::Unload);
     // A crash while it is unloaded is a finding of this topic.
     let run = checker.evaluate("resources.settings", writer.sequence.clone(), |_| None)?;
     checker.record("logs.printed", &run, &writer.sequence, |run| {

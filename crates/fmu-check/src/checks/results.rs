@@ -1,7 +1,7 @@
 //! Checks that results do not depend on the process, arguments of the instantiation, other instances, threads, reads or the step size, and
 //! that the FMU returns the right times.
 
-use crate::call_sequence::{Arg, Kind, Make, Run, Step};
+use crate::call_sequence::{Action, Arg, Kind, Make, Run};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Criterion, any, status_name};
@@ -18,7 +18,7 @@ const COMPLETE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 pub fn repeat(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let one = writer.write(0, COMPLETE).reads;
-    writer.add(Step::FreshProcess);
+    writer.add(Action::FreshProcess);
     let other = writer.write(0, COMPLETE).reads;
     let criterion = checker.differ(&one, &other, "{} is {}, in another process {}");
     checker.check("results.process", writer.sequence, criterion)

@@ -1,7 +1,7 @@
 //! Checks that freeing an instance does not affect others, that the library can be unloaded and loaded again, and that the
 //! process exits after two instances.
 
-use crate::call_sequence::Step;
+use crate::call_sequence::Action;
 use crate::checker::Checker;
 use crate::finding::any;
 use crate::writer::Part::{Begin, Call, Free, ReadAll, Run};
@@ -36,9 +36,9 @@ pub fn freed(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     remaining.extend((half >= points.len()).then_some(3));
     remaining.push(2);
     remaining.into_iter().for_each(|instance| drop(writer.write(instance, &[Free])));
-    writer.add(Step::Unload);
+    writer.add(Action::Unload);
     let again = writer.write(0, &[Begin, ReadAll, Run(0), Free]).reads;
-    writer.add(Step::Unload);
+    writer.add(Action::Unload);
     let criteria = [
         checker.differ(&single, &middle, "{} is {}, after other instances were freed {}"),
         checker.differ(&single, &again, "{} is {}, after the library was unloaded and loaded again {}"),
@@ -54,6 +54,6 @@ fn quit(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     writer.write(2, &[Begin]);
     writer.write(1, &[Free]);
     writer.write(2, &[Free]);
-    writer.add(Step::Quit);
+    writer.add(Action::Quit);
     checker.check("life_cycle.exit", writer.sequence, |_| None)
 }

@@ -1,6 +1,6 @@
 //! Checks that a simulation from a restored state equals the first one, in the same instance, in a new instance, and in a new process.
 
-use crate::call_sequence::{Step, Values};
+use crate::call_sequence::{Action, Values};
 use crate::checker::Checker;
 use crate::finding::{any, fails, unless_fails};
 use crate::writer::Part::{Begin, Call, Drop, Enter, Free, Leave, Make, Points, ReadAll, Restore, Run, Save};
@@ -135,7 +135,7 @@ pub fn from_bytes(
         let serialize = writer.serialize(0, 0);
         let [first] = writer.groups(0, &[Run(index)]);
         if fresh {
-            writer.add(Step::FreshProcess);
+            writer.add(Action::FreshProcess);
         } else {
             writer.write(0, &[Drop(0), Free]);
         }

@@ -1,7 +1,7 @@
 //! Checks that results do not depend on the environment of the process, on the thread, or on what the importer announces, and that
 //! the results remain after the end of the simulation.
 
-use crate::call_sequence::{Arg, Run, Step};
+use crate::call_sequence::{Action, Arg, Run};
 use crate::checker::Checker;
 use crate::writer::Part::{Begin, Call, Free, Points, Read, ReadAll, Run as RunFrom};
 use crate::writer::{Part, Trajectory, value_of, values_of};
@@ -14,8 +14,8 @@ const COMPLETE: &[Part] = &[Begin, ReadAll, RunFrom(0)];
 pub fn environment(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer(trajectory);
     let usual = checker.numeric(writer.write(0, COMPLETE).reads);
-    writer.add(Step::FreshProcess);
-    writer.add(Step::Environment);
+    writer.add(Action::FreshProcess);
+    writer.add(Action::Environment);
     let changed = checker.numeric(writer.write(0, COMPLETE).reads);
     let criterion = checker.differ(&usual, &changed, "{} is {}, in another environment {}");
     checker.check("results.environment", writer.sequence, criterion)
@@ -43,7 +43,7 @@ pub fn no_earlier_state(checker: &Checker, trajectory: &Trajectory) -> anyhow::R
     let begin = writer.sequence.len();
     let announced = writer.write(0, COMPLETE).reads;
     for numbered in &mut writer.sequence[begin..] {
-        if let Step::Call { function, args, .. } = &mut numbered.step {
+        if let Action::Call { function, args, .. } = &mut numbered.action {
             let index = match &function[4..] {
                 "DoStep" => 2,
                 "CompletedIntegratorStep" => 0,

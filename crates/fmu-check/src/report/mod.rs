@@ -167,13 +167,13 @@ impl Report {
                 0 => String::new(),
                 count => format!("; and {count} more"),
             };
-            let calls = match finding.steps {
+            let calls = match finding.length {
                 (0, 0) => String::new(),
-                (_, steps) => match &finding.proof {
+                (_, length) => match &finding.proof {
                     Proof::NotShown(why) | Proof::NotRun(why) => {
-                        format!("; {steps} calls, not reproduced ({why}), so only a note")
+                        format!("; {length} calls, not reproduced ({why}), so only a note")
                     }
-                    Proof::Files | Proof::Shown => format!("; {steps} calls reproduce it"),
+                    Proof::Files | Proof::Shown => format!("; {length} calls reproduce it"),
                 },
             };
             let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };

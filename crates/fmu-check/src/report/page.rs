@@ -22,7 +22,7 @@ fn calls(number: usize, finding: &Finding) -> String {
     format!(
         "<details><summary>{} calls</summary><pre>{}</pre>\n{expected}\
          <p>To repeat the calls: <code>fmu-check replay report.json {number}</code></p></details>\n",
-        finding.steps.1,
+        finding.length.1,
         lines(&finding.calls)
     )
 }

@@ -180,7 +180,7 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
 #[cfg(test)]
 mod tests {
     use super::Evidence;
-    use crate::call_sequence::{Arg, Kind, Numbered, Outcome, Run, Step, Values};
+    use crate::call_sequence::{Action, Arg, Kind, Numbered, Outcome, Run, Values};
     use crate::finding::{Finding, SharedCriterion};
     use std::sync::Arc;
     use std::time::{Duration, Instant};
@@ -195,7 +195,7 @@ mod tests {
             Numbered {
                 id,
                 forbidden: false,
-                step: Step::Call { instance: Some(0), function: function.to_owned(), args },
+                action: Action::Call { instance: Some(0), function: function.to_owned(), args },
             }
         };
         let sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];

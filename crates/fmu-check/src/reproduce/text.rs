@@ -1,7 +1,8 @@
 //! Call sequences as text.
 
 use crate::call_sequence::{
-    Arg, CallSequence, End, Integration, Make, NULL_INSTANCE, Numbered, Outcome, Run, Step, Values, step_of,
+    Action, Arg, CallSequence, End, Integration, Make, NULL_INSTANCE, Numbered, Outcome, Run, Values,
+    action_of,
 };
 use crate::description::{Description, type_name};
 use crate::evidence::{Evidence, Expected, Measure};
@@ -35,25 +36,25 @@ impl Printed<'_> {
         for numbered in sequence {
             let indent = "    ".repeat(depth);
             let mut heading = |text: String| lines.push(format!("      {indent}{text}"));
-            match &numbered.step {
-                Step::Repeat(times, steps) => {
+            match &numbered.action {
+                Action::Repeat(times, actions) => {
                     heading(format!("repeat {times} times, or until the time for repetitions is over:"));
-                    self.block(steps, depth + 1, lines);
+                    self.block(actions, depth + 1, lines);
                 }
-                Step::Copies(times, stride, steps) => {
+                Action::Copies(times, stride, actions) => {
                     heading(format!("repeat {times} times, with numbers that increase by {stride}:"));
                     // The results belong to one copy only.
-                    Printed { run: None, ..*self }.block(steps, depth + 1, lines);
+                    Printed { run: None, ..*self }.block(actions, depth + 1, lines);
                 }
-                Step::Parallel(sequences) => {
+                Action::Parallel(sequences) => {
                     for (number, sequence) in sequences.iter().enumerate() {
                         lines.push(format!("      {indent}on thread {}, at the same time:", number + 1));
                         self.block(sequence, depth + 1, lines);
                     }
                 }
-                step => {
+                action => {
                     let result = self.run.map_or(String::new(), |run| result(run, numbered, sequence));
-                    lines.push(format!("{:5} {indent}{}{result}", numbered.id, self.step(step)));
+                    lines.push(format!("{:5} {indent}{}{result}", numbered.id, self.action(action)));
                 }
             }
         }
@@ -63,35 +64,35 @@ impl Printed<'_> {
         if self.description.standard == Standard::Fmi3 { "fmi3" } else { "fmi2" }
     }
 
-    /// Returns a step that contains no other steps.
-    fn step(&self, step: &Step) -> String {
-        match step {
-            Step::Make(index, make) => format!("{} = {}", instance(Some(*index)), self.make(make)),
-            Step::Free(index) => format!("{}FreeInstance({})", self.prefix(), instance(Some(*index))),
-            Step::Call { instance: of, function, args } => {
+    /// Returns an action that contains no other actions.
+    fn action(&self, action: &Action) -> String {
+        match action {
+            Action::Make(index, make) => format!("{} = {}", instance(Some(*index)), self.make(make)),
+            Action::Free(index) => format!("{}FreeInstance({})", self.prefix(), instance(Some(*index))),
+            Action::Call { instance: of, function, args } => {
                 let args = args.iter().enumerate().map(|(index, arg)| self.argument(function, index, arg));
                 let all: Vec<String> = std::iter::once(instance(*of)).chain(args).collect();
                 format!("{function}({})", all.join(", "))
             }
-            Step::Version(name) => format!("{name}()"),
-            Step::Integrate(index, Integration { begin, end, steps, euler, .. }) => {
+            Action::Version(name) => format!("{name}()"),
+            Action::Integrate(index, Integration { begin, end, steps, euler, .. }) => {
                 let method = if *euler { "Euler's method" } else { "the classical Runge-Kutta method" };
                 format!(
                     "integrate {} from {begin:?} to {end:?} by {method} in {steps} steps, and handle its events",
                     instance(Some(*index))
                 )
             }
-            Step::Measure => "measure memory, threads, open files and settings of the process".to_owned(),
-            Step::FreshProcess => {
+            Action::Measure => "measure memory, threads, open files and settings of the process".to_owned(),
+            Action::FreshProcess => {
                 "continue in a new process, which gets only the serialized states".to_owned()
             }
-            Step::Elsewhere(name) => format!("use the FMU through the directory {name:?}"),
-            Step::Environment => {
+            Action::Elsewhere(name) => format!("use the FMU through the directory {name:?}"),
+            Action::Environment => {
                 "use another working directory, home directory, language and time zone".to_owned()
             }
-            Step::Unload => "unload the library".to_owned(),
-            Step::Quit => "exit(0)".to_owned(),
-            Step::Repeat(..) | Step::Parallel(_) | Step::Copies(..) => String::new(),
+            Action::Unload => "unload the library".to_owned(),
+            Action::Quit => "exit(0)".to_owned(),
+            Action::Repeat(..) | Action::Parallel(_) | Action::Copies(..) => String::new(),
         }
     }
 
@@ -192,7 +193,7 @@ fn values(values: &Values) -> String {
     }
 }
 
-/// Returns the result of a step, with an arrow before it.
+/// Returns the result of an action, with an arrow before it.
 fn result(run: &Run, numbered: &Numbered, sequence: &[Numbered]) -> String {
     let Some(outcome) = run.outcome(numbered.id) else {
         let ends = run.at == Some(numbered.id);
@@ -205,16 +206,18 @@ fn result(run: &Run, numbered: &Numbered, sequence: &[Numbered]) -> String {
 
 fn outcome_text(numbered: &Numbered, outcome: &Outcome) -> String {
     let mut parts = Vec::new();
-    match (&numbered.step, outcome.status) {
+    match (&numbered.action, outcome.status) {
         _ if outcome.missing => parts.push("not in the library".to_owned()),
-        (Step::Make(..), Some(0)) => parts.push("NULL".to_owned()),
-        (Step::Call { .. } | Step::Integrate(..), Some(status)) => parts.push(status_name(status)),
-        (Step::Call { .. }, None) => parts.push("not executed, because there is no instance".to_owned()),
-        (Step::Version(_), _) => parts.push(string(outcome.text.as_deref())),
+        (Action::Make(..), Some(0)) => parts.push("NULL".to_owned()),
+        (Action::Call { .. } | Action::Integrate(..), Some(status)) => parts.push(status_name(status)),
+        (Action::Call { .. }, None) => parts.push("not executed, because there is no instance".to_owned()),
+        (Action::Version(_), _) => parts.push(string(outcome.text.as_deref())),
         _ => {}
     }
-    match (&numbered.step, &outcome.written[..]) {
-        (Step::Call { function, .. }, [Values::Numbers(_, words)]) if function == "fmi2NewDiscreteStates" => {
+    match (&numbered.action, &outcome.written[..]) {
+        (Action::Call { function, .. }, [Values::Numbers(_, words)])
+            if function == "fmi2NewDiscreteStates" =>
+        {
             parts.extend(event_info(words));
         }
         (_, written) => parts.extend(written.iter().map(values)),
@@ -261,8 +264,8 @@ pub fn expectation(evidence: &Evidence, sequence: &CallSequence, run: Option<&Ru
                 let values = values.map_or(String::new(), |[one, other]| format!(": {one} and {other}"));
                 format!("calls {one} and {other} return different values{values}")
             };
-            let step = |call: &Expected| step_of(sequence, call.id).map(|numbered| &numbered.step);
-            let makes = |call: &&Expected| matches!(step(call), Some(Step::Make(..)));
+            let action = |call: &Expected| action_of(sequence, call.id).map(|numbered| &numbered.action);
+            let makes = |call: &&Expected| matches!(action(call), Some(Action::Make(..)));
             let is_plain = |call: &&Expected| {
                 !makes(call) && **call == Expected { id: call.id, status: Some(0), ..Expected::default() }
             };

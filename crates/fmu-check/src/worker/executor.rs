@@ -63,9 +63,9 @@ pub struct Executor {
     pub bytes: Mutex<HashMap<usize, Vec<u8>>>,
     /// Sizes of serialized states that the FMU has returned, by index.
     pub sizes: Mutex<HashMap<usize, usize>>,
-    /// File for the outcomes of the steps.
+    /// File for the outcomes of the actions.
     pub file: Mutex<File>,
-    /// Number of the step before which this process waits for a debugger.
+    /// Number of the action before which this process waits for a debugger.
     pub stop_before: Option<u32>,
     /// Stamp of the job.
     pub stamp: u64,

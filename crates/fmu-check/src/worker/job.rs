@@ -29,7 +29,7 @@ pub struct Job {
     pub sequence: CallSequence,
     /// Serialized states of earlier processes of the call sequence, by index.
     pub bytes: HashMap<usize, Vec<u8>>,
-    /// Number of the step before which the process waits for a debugger.
+    /// Number of the action before which the process waits for a debugger.
     pub stop_before: Option<u32>,
     /// Random number with which each line of the outcomes begins, because the FMU could write to their file, too.
     pub stamp: u64,
@@ -51,7 +51,7 @@ pub struct Ended {
     pub signal: Option<i32>,
     /// Standard output and standard error.
     pub output: String,
-    /// Outcomes of the steps, a line for each, which has the stamp of the job and JSON.
+    /// Outcomes of the actions, a line for each, which has the stamp of the job and JSON.
     pub outcomes: String,
     /// Names of the child processes that were alive after the process had ended.
     pub orphans: Vec<String>,
@@ -71,7 +71,7 @@ impl From<ExitStatus> for Ended {
     }
 }
 
-/// Last line that a worker writes, after all steps. It has the serialized states by index.
+/// Last line that a worker writes, after all actions. It has the serialized states by index.
 #[derive(Serialize, Deserialize)]
 pub struct Last {
     pub bytes: HashMap<usize, Vec<u8>>,

@@ -1,6 +1,7 @@
 //! Process that loads the library and executes a call sequence. The FMU may crash the process, so each result is written to a file
 //! before the next call.
 
+mod actions;
 mod arrays;
 mod contain;
 mod executor;
@@ -12,7 +13,6 @@ mod memory;
 #[cfg(target_os = "linux")]
 mod server;
 mod settings;
-mod steps;
 mod updates;
 mod work;
 

@@ -3,14 +3,14 @@
 use super::executor::{Executor, PROCESS};
 use super::job::{EXECUTED, Job, Last, OWN_FAULT};
 use super::{locked, memory};
-use crate::call_sequence::{Setting, Step};
+use crate::call_sequence::{Action, Setting};
 use std::fs::File;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
 /// Writes the buffered output, and ends the process. On Unix, the exit handlers of the library do not run, because only
-/// `Step::Quit` tests them.
+/// `Action::Quit` tests them.
 pub fn end(result: Result<(), String>) -> ! {
     let status = match result {
         Ok(()) => EXECUTED,
@@ -29,16 +29,16 @@ pub fn end(result: Result<(), String>) -> ! {
     std::process::exit(status)
 }
 
-/// Executes a call sequence, and writes the outcome of each step to the file, as a line with the stamp of the job and JSON.
+/// Executes a call sequence, and writes the outcome of each action to the file, as a line with the stamp of the job and JSON.
 pub fn work(job: Job, file: File) {
     limit(job.setting.memory);
     PROCESS.store(std::process::id(), Ordering::Relaxed);
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
-    let setting = match job.sequence.first().map(|numbered| &numbered.step) {
-        Some(Step::Elsewhere(name)) => elsewhere(&job.setting, name),
-        Some(Step::Environment) => {
+    let setting = match job.sequence.first().map(|numbered| &numbered.action) {
+        Some(Action::Elsewhere(name)) => elsewhere(&job.setting, name),
+        Some(Action::Environment) => {
             change_environment();
             job.setting
         }

@@ -4,7 +4,7 @@ mod parts;
 mod reads;
 mod variables;
 
-use crate::call_sequence::{Arg, CallSequence, Integration, Kind, Make, Numbered, Step, Values};
+use crate::call_sequence::{Action, Arg, CallSequence, Integration, Kind, Make, Numbered, Values};
 use crate::description::Description;
 use crate::legal::Modes;
 use fmi_abi::calls::signatures;
@@ -43,19 +43,19 @@ impl Trajectory {
     }
 }
 
-/// Writes a call sequence step by step.
+/// Writes a call sequence action by action.
 pub struct Writer<'a> {
     pub description: &'a Description,
     /// Simulation on which the sequence is based.
     pub trajectory: &'a Trajectory,
     /// Indices of the variables that are read.
     pub readable: &'a [usize],
-    /// Steps that were written.
+    /// Actions that were written.
     pub sequence: CallSequence,
     pub next: u32,
-    /// Whether the standard forbids the next steps.
+    /// Whether the standard forbids the next actions.
     pub forbidden: bool,
-    /// Modes of the instances after the last step.
+    /// Modes of the instances after the last action.
     pub modes: Modes,
 }
 
@@ -69,11 +69,11 @@ impl<'a> Writer<'a> {
         self.description.standard == Standard::Fmi3
     }
 
-    /// Adds a step; returns its number.
-    pub fn add(&mut self, step: Step) -> u32 {
+    /// Adds an action; returns its number.
+    pub fn add(&mut self, action: Action) -> u32 {
         let id = self.next;
         self.next += 1;
-        let numbered = Numbered { id, forbidden: self.forbidden, step };
+        let numbered = Numbered { id, forbidden: self.forbidden, action };
         self.modes.add(self.description, &numbered);
         self.sequence.push(numbered);
         id
@@ -88,13 +88,13 @@ impl<'a> Writer<'a> {
 
     /// Adds a call of a function, which is named without `fmi2` or `fmi3`.
     pub fn call(&mut self, instance: usize, function: &str, args: Vec<Arg>) -> u32 {
-        self.add(Step::Call { instance: Some(instance), function: self.named(function), args })
+        self.add(Action::Call { instance: Some(instance), function: self.named(function), args })
     }
 
     /// Adds a call that the standard forbids, or whose arguments it forbids.
     pub fn forbidden(&mut self, instance: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
         let before = std::mem::replace(&mut self.forbidden, true);
-        let id = self.add(Step::Call { instance, function: self.named(function), args });
+        let id = self.add(Action::Call { instance, function: self.named(function), args });
         self.forbidden = before;
         id
     }
@@ -122,11 +122,11 @@ impl<'a> Writer<'a> {
     pub fn make_with(&mut self, instance: usize, change: impl FnOnce(&mut Make)) -> u32 {
         let mut how = self.how();
         change(&mut how);
-        self.add(Step::Make(instance, how))
+        self.add(Action::Make(instance, how))
     }
 
     pub fn free(&mut self, instance: usize) -> u32 {
-        self.add(Step::Free(instance))
+        self.add(Action::Free(instance))
     }
 
     /// Enters Initialization Mode at the start time of the default experiment.
@@ -235,7 +235,7 @@ impl<'a> Writer<'a> {
     /// Integrates Model Exchange with this number of steps of Euler's or of the classical Runge-Kutta method.
     pub fn integrate_in(&mut self, instance: usize, begin: f64, end: f64, steps: usize, euler: bool) -> u32 {
         let (states, indicators) = (self.description.states_count(), self.description.indicators_count());
-        self.add(Step::Integrate(instance, Integration { begin, end, steps, euler, states, indicators }))
+        self.add(Action::Integrate(instance, Integration { begin, end, steps, euler, states, indicators }))
     }
 
     /// Advances by the step of this number, counted from 0, of a simulation in equal steps: by a step of Co-Simulation, or by an
@@ -279,22 +279,22 @@ impl<'a> Writer<'a> {
         .map(|(name, count)| (count > 0).then(|| self.vector(instance, name, count)))
     }
 
-    /// Returns a writer for the steps of a thread, whose numbers follow the ones of this writer.
+    /// Returns a writer for the actions of a thread, whose numbers follow the ones of this writer.
     pub fn thread(&self) -> Self {
         Self { next: self.next, ..Self::new(self.description, self.trajectory, self.readable) }
     }
 
-    /// Runs the steps of these writers at the same time. Each was made by `thread` of the one before, the first by `thread` of this.
+    /// Runs the actions of these writers at the same time. Each was made by `thread` of the one before, the first by `thread` of this.
     pub fn join(&mut self, threads: Vec<Self>) {
         self.next = threads.last().map_or(self.next, |thread| thread.next);
-        self.add(Step::Parallel(threads.into_iter().map(|thread| thread.sequence).collect()));
+        self.add(Action::Parallel(threads.into_iter().map(|thread| thread.sequence).collect()));
     }
 
     pub fn derivatives_name(&self) -> &'static str {
         if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
 
-    /// Serializes a saved state in two calls, for the size and for the bytes; returns the step number of each.
+    /// Serializes a saved state in two calls, for the size and for the bytes; returns the number of each.
     pub fn serialize(&mut self, instance: usize, slot: usize) -> [u32; 2] {
         let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [

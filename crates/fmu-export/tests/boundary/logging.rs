@@ -1,6 +1,6 @@
 //! Content of log messages, and when they are logged (sections 2.1.5 and 2.2.4 of FMI 2.0).
 
-use crate::models::clumsy::{ClumsyOnHeapName, Fault};
+use crate::models::clumsy::{ClumsyOnHeapName, Failure};
 use crate::models::{ClumsyOnHeap, Oscillator, Talker, talker::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -156,22 +156,22 @@ fn messages_of_a_model_that_fails() {
     let fmu = logging::<ClumsyOnHeap>(true);
     let messages =
         |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.message).collect::<Vec<_>>();
-    let fails = |fault: Fault| fmu.set_item(ClumsyOnHeapName::fails as u32, fault as i32);
+    let fails = |failure: Failure| fmu.set_item(ClumsyOnHeapName::fails as u32, failure as i32);
     assert_eq!(messages(&fmu), ["made", "instantiated"]);
     let failed = |function: &str, at: &str| {
         [format!("{at} will fail"), format!("{function}: {at} has failed half-way")]
     };
-    assert_eq!(fails(Fault::Update), Status::Error);
+    assert_eq!(fails(Failure::Update), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2SetInteger", "Update"));
-    fmu.ok(fails(Fault::Initialize));
+    fmu.ok(fails(Failure::Initialize));
     assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2EnterInitializationMode", "Initialize"));
-    fmu.ok(fails(Fault::Event));
+    fmu.ok(fails(Failure::Event));
     fmu.ok(fmu.fmi2EnterInitializationMode());
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2ExitInitializationMode", "Event"));
     // The model rejects the de-serialized bytes.
-    let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Fault::Update as i64).to_le_bytes());
+    let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Failure::Update as i64).to_le_bytes());
     let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
     assert_eq!(status, Status::Error);
     assert_eq!(messages(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));

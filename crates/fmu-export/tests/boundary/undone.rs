@@ -1,6 +1,6 @@
 //! An error leaves the instance as it was, even if the model has changed everything before it failed.
 
-use crate::models::clumsy::{ClumsyName, Fault};
+use crate::models::clumsy::{ClumsyName, Failure};
 use crate::models::*;
 use fmu_export::Interface::*;
 use fmu_export::{Exported, Status};
@@ -19,8 +19,8 @@ const REALS: [u32; 7] = [
     GAIN,
 ];
 
-fn fails(fmu: &impl Either, fault: Fault) {
-    fmu.ok(fmu.set_item(FAILS, fault as i32));
+fn fails(fmu: &impl Either, failure: Failure) {
+    fmu.ok(fmu.set_item(FAILS, failure as i32));
 }
 
 /// Everything that an importer can read: the bits of the Reals, the number of iterations of events, and the serialized state.
@@ -34,13 +34,13 @@ fn readings(fmu: &impl Either) -> Readings {
 /// Lets the model fail with `cause`, checks that the call then fails and changes nothing, and removes the cause. Returns
 /// the message.
 #[track_caller]
-fn undone<F: Either>(fmu: &F, cause: Fault, call: impl FnOnce(&F) -> Status) -> String {
+fn undone<F: Either>(fmu: &F, cause: Failure, call: impl FnOnce(&F) -> Status) -> String {
     fails(fmu, cause);
     let before = readings(fmu);
     let message = fmu.rejected(&format!("{cause:?}"), call);
     assert!(message.ends_with(&format!("{cause:?} has failed half-way")), "{message}");
     assert_eq!(readings(fmu), before, "{cause:?}");
-    fails(fmu, Fault::Nothing);
+    fails(fmu, Failure::Nothing);
     message
 }
 
@@ -48,10 +48,10 @@ fn undone<F: Either>(fmu: &F, cause: Fault, call: impl FnOnce(&F) -> Status) -> 
 fn begin<F: Either>(fmu: &F, with_failures: bool) {
     fmu.set(&[U], &[0.5]);
     if with_failures {
-        fails(fmu, Fault::Initialize);
+        fails(fmu, Failure::Initialize);
         fmu.rejected_with(&["has failed half-way"], |fmu| fmu.enter_initialization_mode(0.0, None));
-        fmu.rejected_with(&["has failed half-way"], |fmu| fmu.set_item(FAILS, Fault::Update as i32));
-        fails(fmu, Fault::Nothing);
+        fmu.rejected_with(&["has failed half-way"], |fmu| fmu.set_item(FAILS, Failure::Update as i32));
+        fails(fmu, Failure::Nothing);
     }
     fmu.initialize(0.0);
 }
@@ -64,11 +64,11 @@ fn simulate<F: Either, M: Exported>(with_failures: bool) -> Vec<(Readings, Readi
         let time = 0.35 * f64::from(step);
         if with_failures {
             fmu.set(&[U], &[0.7]);
-            undone(&fmu, Fault::Step, |fmu| fmu.try_step(time, 0.35));
-            undone(&fmu, Fault::Step, |fmu| fmu.try_step(time, 1e-3));
+            undone(&fmu, Failure::Step, |fmu| fmu.try_step(time, 0.35));
+            undone(&fmu, Failure::Step, |fmu| fmu.try_step(time, 1e-3));
             if (time + 0.35).floor() > time.floor() {
-                for fault in [Fault::Event, Fault::StepAfterEvent] {
-                    let message = undone(&fmu, fault, |fmu| fmu.try_step(time, 0.35));
+                for failure in [Failure::Event, Failure::StepAfterEvent] {
+                    let message = undone(&fmu, failure, |fmu| fmu.try_step(time, 0.35));
                     let at = format!("DoStep: the step cannot go on at {}: ", time.ceil());
                     assert!(message.contains(&at), "{message}");
                 }
@@ -101,15 +101,15 @@ fn steps_of_an_importer_that_handles_events() {
         fmu.initialize(0.0);
         while fmu.update().again {}
         fmu.leave_event_mode();
-        undone(&fmu, Fault::Step, |fmu| fmu.try_step(0.0, 0.5));
+        undone(&fmu, Failure::Step, |fmu| fmu.try_step(0.0, 0.5));
         let stepped = fmu.do_step(0.0, 1.5).unwrap();
         assert_eq!((stepped.event_handling_needed, stepped.last_successful_time), (true, 1.0));
         fmu.ok(fmu.fmi3EnterEventMode());
         assert!(fmu.update().again);
-        undone(&fmu, Fault::Event, |fmu| fmu.try_update().unwrap_err());
+        undone(&fmu, Failure::Event, |fmu| fmu.try_update().unwrap_err());
         fmu.update();
         fmu.ok(fmu.fmi3EnterStepMode());
-        undone(&fmu, Fault::StepAfterEvent, |fmu| fmu.try_step(1.0, 0.5));
+        undone(&fmu, Failure::StepAfterEvent, |fmu| fmu.try_step(1.0, 0.5));
         fmu.step(1.0, 0.5);
     }
     check::<Clumsy>();
@@ -122,7 +122,7 @@ fn an_event_at_the_start_that_fails() {
     fn check<F: Either, M: Exported>() {
         let fmu = F::new::<M>(CoSimulation);
         fmu.enter_initialization(0.0, None);
-        undone(&fmu, Fault::Event, F::exit_initialization_mode);
+        undone(&fmu, Failure::Event, F::exit_initialization_mode);
         fmu.ok(fmu.exit_initialization_mode());
         assert_eq!(fmu.integer(ClumsyName::rounds as u32), 2);
     }
@@ -141,7 +141,7 @@ fn in_model_exchange() {
         fmu.ok(fmu.set_time(1.0));
         fmu.ok(fmu.enter_event_mode());
         assert!(fmu.update().again);
-        undone(&fmu, Fault::Event, |fmu| fmu.try_update().unwrap_err());
+        undone(&fmu, Failure::Event, |fmu| fmu.try_update().unwrap_err());
         assert_eq!(fmu.update().next, Some(2.0));
     }
     check::<Importer, Clumsy>();
@@ -157,11 +157,11 @@ fn a_failed_step_may_be_tried_again_after_a_reset() {
         for _ in 0..2 {
             begin(&fmu, true);
             // Until the first step, the level follows the input.
-            undone(&fmu, Fault::StepAfterEvent, |fmu| fmu.try_step(0.0, 1.5));
+            undone(&fmu, Failure::StepAfterEvent, |fmu| fmu.try_step(0.0, 1.5));
             fmu.set(&[U], &[0.9]);
             assert_eq!(fmu.get([ClumsyName::level as u32]), [0.9]);
             fmu.step(0.0, 0.5);
-            undone(&fmu, Fault::Step, |fmu| fmu.try_step(0.5, 0.25));
+            undone(&fmu, Failure::Step, |fmu| fmu.try_step(0.5, 0.25));
             fmu.ok(fmu.reset());
         }
     }

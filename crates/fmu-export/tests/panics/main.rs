@@ -6,12 +6,12 @@ use fmu_test_kit::models;
 
 mod calls;
 
-use calls::{Case, Special, of_both, set_fault};
+use calls::{Case, Special, of_both, set_panic};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
 use fmu_test_kit::{Arguments, Either, Importer, fmi3};
 use models::Faulty;
-use models::faulty::{Fault, Name, while_all_break};
+use models::faulty::{Name, Panic, while_all_break};
 use std::ptr::null_mut;
 
 const U: u32 = Name::u as u32;
@@ -19,7 +19,7 @@ const Y: u32 = Name::y as u32;
 const X: u32 = Name::x as u32;
 const BOOLEAN: u32 = Name::boolean as u32;
 const STRING: u32 = Name::string as u32;
-const FAULT: u32 = Name::fault as u32;
+const PANIC: u32 = Name::panic as u32;
 
 fn initialized<F: Either>(interface: Interface) -> F {
     let fmu = F::new::<Faulty>(interface);
@@ -40,9 +40,9 @@ fn fatal<F: Either>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> St
     log[0].message.clone()
 }
 
-/// Returns whether the fault already occurs in the call that sets the parameter.
-fn occurs_when_set(fault: Fault) -> bool {
-    [Fault::Update, Fault::Log].contains(&fault)
+/// Returns whether the model already panics in the call that sets the parameter.
+fn occurs_when_set(panic: Panic) -> bool {
+    [Panic::Update, Panic::Log].contains(&panic)
 }
 
 /// Checks both FMI versions in one test, because Rust's output about panics can only be disabled for the whole process.
@@ -63,35 +63,35 @@ fn contained<F: Special>() {
     all.for_each(|case| is_contained(case, &bystanders));
 
     let fmu = F::new::<Faulty>(CoSimulation);
-    fmu.ok(set_fault(&fmu, Fault::Initialize));
+    fmu.ok(set_panic(&fmu, Panic::Initialize));
     let message = fatal(&fmu, "initialization", |fmu| fmu.enter_initialization_mode(0.0, None));
     assert!(message.starts_with(&named::<F>("EnterInitializationMode")), "{message}");
     check_that_all_is_over(&fmu);
 
     let fmu: F = initialized(ModelExchange);
-    fmu.ok(set_fault(&fmu, Fault::ContinuousTimeEntered));
+    fmu.ok(set_panic(&fmu, Panic::ContinuousTimeEntered));
     let message = fatal(&fmu, "continuous time", F::enter_continuous_time_mode);
     assert!(message.starts_with(&named::<F>("EnterContinuousTimeMode")), "{message}");
     check_that_all_is_over(&fmu);
 
     // Freeing an instance succeeds even if the model panics while the instance or one of its remaining states is dropped.
     let fmu = F::new::<Faulty>(CoSimulation);
-    fmu.ok(set_fault(&fmu, Fault::Drop));
+    fmu.ok(set_panic(&fmu, Panic::Drop));
     (0..3).for_each(|_| _ = fmu.save());
     without_output(|| drop(fmu));
 
     // A panic while an instance is reset or created is reported.
     let fmu = F::new::<Faulty>(CoSimulation);
-    fatal(&fmu, "reset", |fmu| while_all_break(Fault::New, || fmu.reset()));
+    fatal(&fmu, "reset", |fmu| while_all_break(Panic::New, || fmu.reset()));
     check_that_all_is_over(&fmu);
     let none = || F::make::<Faulty>(&Arguments::new::<Faulty>(CoSimulation)).map(drop);
-    let log = without_output(|| while_all_break(Fault::New, none))
+    let log = without_output(|| while_all_break(Panic::New, none))
         .expect_err("the instantiation must fail if the model panics");
     let [message] = log.as_slice() else {
         panic!("expected one message about the panic of an instantiation: {log:?}")
     };
     assert!(message.message.starts_with(&named::<F>("Instantiate")), "{message:?}");
-    assert!(message.message.contains("fault _New at 100_s"), "{message:?}");
+    assert!(message.message.contains("panic _New at 100_s"), "{message:?}");
 
     let [co_simulation, model_exchange] = &bystanders;
     co_simulation.step(0.0, 0.1);
@@ -100,20 +100,20 @@ fn contained<F: Special>() {
 }
 
 /// Asserts that the call is fatal for its instance and leaves the `bystanders`, two other instances, usable.
-fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders: &[F; 2]) {
+fn is_contained<F: Either>((interface, names, panic, call): Case<F>, bystanders: &[F; 2]) {
     let name = named::<F>(names[usize::from(named::<F>("") == "fmi3")]);
     let fmu: F = initialized(interface);
-    if !occurs_when_set(fault) {
-        fmu.ok(set_fault(&fmu, fault));
+    if !occurs_when_set(panic) {
+        fmu.ok(set_panic(&fmu, panic));
     }
     if interface == ModelExchange {
         fmu.ok(fmu.enter_continuous_time_mode());
     }
     let message = fatal(&fmu, &name, call);
-    let reason = match fault {
-        Fault::NoMessage | Fault::Bomb => "no message".into(),
-        Fault::None => "fault _Clone at 100_s".into(),
-        fault => format!("fault _{fault:?} at 100_s"),
+    let reason = match panic {
+        Panic::NoMessage | Panic::Bomb => "no message".into(),
+        Panic::None => "panic _Clone at 100_s".into(),
+        panic => format!("panic _{panic:?} at 100_s"),
     };
     assert!(message.starts_with(&name) && message.contains(&reason), "{message}");
     check_that_all_is_over(&fmu);
@@ -124,9 +124,9 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
 }
 
 /// Tests the library that `FMU_LIBRARY` names, which was compiled from the C sources of the model (`make test-source-fmu`).
-/// Cases with the fault `None` are left out: they call [`while_all_break`], which has no effect in that library. There,
-/// `GetFMUstate` already visits the field `memory` and panics, so one case of it replaces the cases with the fault `Memory`.
-/// Cases with the fault `Drop` are left out: in that library, a panic ends `FreeFMUstate` before it sets the importer's
+/// Cases with `Panic::None` are left out: they call [`while_all_break`], which has no effect in that library. There,
+/// `GetFMUstate` already visits the field `memory` and panics, so one case of it replaces the cases with `Panic::Memory`.
+/// Cases with `Panic::Drop` are left out: in that library, a panic ends `FreeFMUstate` before it sets the importer's
 /// pointer to NULL.
 #[test]
 #[ignore = "needs compiled C sources"]
@@ -136,9 +136,9 @@ fn every_panic_of_c_sources_is_contained() {
         let bystanders: [Importer; 2] = [CoSimulation, ModelExchange].map(initialized);
         let all = of_both::<Importer>().into_iter().chain(Importer::CALLS.iter().copied());
         let possible =
-            |(_, _, fault, _): &Case<_>| ![Fault::None, Fault::Drop, Fault::Memory].contains(fault);
+            |(_, _, panic, _): &Case<_>| ![Panic::None, Panic::Drop, Panic::Memory].contains(panic);
         let saving: Case<Importer> =
-            (CoSimulation, ["GetFMUstate", ""], Fault::Memory, |fmu| fmu.get_state(&mut null_mut()));
+            (CoSimulation, ["GetFMUstate", ""], Panic::Memory, |fmu| fmu.get_state(&mut null_mut()));
         let calls: Vec<_> = all.filter(possible).chain([saving]).collect();
         assert!(calls.len() > 20);
         calls.into_iter().for_each(|case| is_contained(case, &bystanders));

@@ -108,10 +108,10 @@ impl Variables {
     }
 }
 
-/// Fault of a pointer that is passed. It must be one that the FMU can detect, because any other crashes the test.
+/// Kind of a pointer that is passed. The FMU must be able to detect an invalid one, because any other crashes the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
-    None,
+enum Pointer {
+    Valid,
     Null,
     Misaligned,
 }
@@ -132,7 +132,7 @@ pub struct CallArguments {
     pub flags: [i32; 2],
     pub kind: i32,
     pub numbers: [f64; 3],
-    faults: [Fault; 4],
+    pointers: [Pointer; 4],
     /// A length that none of the arrays has, which is passed instead of their lengths.
     wrong_length: Option<usize>,
 }
@@ -239,14 +239,14 @@ impl CallArguments {
             Some(right) if u.ratio(7, 8)? => right,
             _ => count,
         };
-        let mut fault = || -> Result<Fault> {
+        let mut pointer = || -> Result<Pointer> {
             Ok(match u.int_in_range(0..=63_u8)? {
-                0 => Fault::Null,
-                1 => Fault::Misaligned,
-                _ => Fault::None,
+                0 => Pointer::Null,
+                1 => Pointer::Misaligned,
+                _ => Pointer::Valid,
             })
         };
-        let faults = [fault()?, fault()?, fault()?, fault()?];
+        let pointers = [pointer()?, pointer()?, pointer()?, pointer()?];
         let numbers = if function == "fmi2DoStep" {
             let off = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&[0.0, 0.0, 1e-12, -1e-12])? };
             let size = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&STEP_SIZES)? };
@@ -290,7 +290,7 @@ impl CallArguments {
             kind: small(u)?,
             numbers,
             known,
-            faults,
+            pointers,
             wrong_length,
         })
     }
@@ -308,10 +308,10 @@ impl CallArguments {
     /// Returns the address to pass for an array with elements of `size` bytes. `array` is its real address, and `index` is
     /// its index among the array arguments of the function.
     pub fn address(&self, index: usize, array: usize, size: usize) -> usize {
-        match self.faults[index % self.faults.len()] {
-            Fault::Null => 0,
+        match self.pointers[index % self.pointers.len()] {
+            Pointer::Null => 0,
             // Never dereferenced, because the FMU rejects the pointer. An array of bytes cannot be misaligned.
-            Fault::Misaligned if size > 1 => array + 1,
+            Pointer::Misaligned if size > 1 => array + 1,
             _ => array,
         }
     }

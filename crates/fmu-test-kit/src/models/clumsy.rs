@@ -5,7 +5,7 @@ use fmu_export::*;
 
 enumeration! {
     /// The call that fails.
-    pub enum Fault {
+    pub enum Failure {
         /// Nothing
         Nothing = 0,
         /// Every step
@@ -21,7 +21,7 @@ enumeration! {
     }
 }
 
-const FAULT: Type = Type::enumeration("Fault", <Fault as Enumeration>::ITEMS);
+const FAILURE: Type = Type::enumeration("Failure", <Failure as Enumeration>::ITEMS);
 
 /// Defines such a model. `$memory` is the type of `trace`, which stores the last three numbers, and `$log` the type of its log.
 macro_rules! clumsy {
@@ -40,7 +40,7 @@ macro_rules! clumsy {
             }, names $names, memory in trace, next, level, has_stepped;
 
             /// What fails
-            fails: Fault = parameter(&FAULT).start(Fault::Nothing);
+            fails: Failure = parameter(&FAILURE).start(Failure::Nothing);
             /// Input
             u: f64 = input(&NUMBER);
             /// State
@@ -60,17 +60,17 @@ macro_rules! clumsy {
         }
 
         impl $model {
-            /// If `fault` is what fails, overwrites the fields and returns an error.
-            fn fail_at(&mut self, fault: Fault) -> Result<(), Error> {
-                if self.fails != fault {
+            /// If `failure` is what fails, overwrites the fields and returns an error.
+            fn fail_at(&mut self, failure: Failure) -> Result<(), Error> {
+                if self.fails != failure {
                     return Ok(());
                 }
-                self.log.note(format!("{fault:?} will fail"));
+                self.log.note(format!("{failure:?} will fail"));
                 (self.u, self.x, self.rounds, self.gain) = (-1e3, -2e3, -3, -4e3);
-                (self.next, self.product, self.fails) = (-5e3, -6e3, Fault::Nothing);
+                (self.next, self.product, self.fails) = (-5e3, -6e3, Failure::Nothing);
                 (self.level, self.shown) = (-8e3, -9e3);
                 self.collect(-7e3);
-                Err(Error::new(format!("{fault:?} has failed half-way")))
+                Err(Error::new(format!("{failure:?} has failed half-way")))
             }
 
             fn collect(&mut self, number: f64) {
@@ -89,7 +89,7 @@ macro_rules! clumsy {
             }
 
             fn update(&mut self) -> Result<(), Error> {
-                self.fail_at(Fault::Update)?;
+                self.fail_at(Failure::Update)?;
                 self.product = self.gain * self.u;
                 Ok(())
             }
@@ -100,7 +100,7 @@ macro_rules! clumsy {
             }
 
             fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
-                self.fail_at(Fault::Initialize)?;
+                self.fail_at(Failure::Initialize)?;
                 self.next = experiment.start_time;
                 Ok(())
             }
@@ -129,9 +129,9 @@ macro_rules! clumsy {
                 self.has_stepped = true;
                 self.x += self.gain * self.u * (end - step.time);
                 self.collect(self.x);
-                self.fail_at(Fault::Step)?;
+                self.fail_at(Failure::Step)?;
                 if step.time == self.next - 1.0 && self.rounds > 2 {
-                    self.fail_at(Fault::StepAfterEvent)?;
+                    self.fail_at(Failure::StepAfterEvent)?;
                 }
                 if end < self.next {
                     return Ok(Stepped::Done);
@@ -155,7 +155,7 @@ macro_rules! clumsy {
                     again = self.rounds % 2 == 1;
                     if !again {
                         self.next += 1.0;
-                        self.fail_at(Fault::Event)?;
+                        self.fail_at(Failure::Event)?;
                     }
                 }
                 Ok(Event { again, next: Some(self.next), ..Event::default() })

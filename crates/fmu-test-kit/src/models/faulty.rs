@@ -6,7 +6,7 @@ use std::cell::Cell;
 /// The method in which the model panics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(i32)]
-pub enum Fault {
+pub enum Panic {
     None,
     Read,
     Then,
@@ -36,21 +36,21 @@ pub enum Fault {
 }
 
 thread_local! {
-    /// [`Fault::New`] or [`Fault::Clone`] while every new instance or every copy panics.
-    static EVERYWHERE: Cell<Fault> = const { Cell::new(Fault::None) };
+    /// [`Panic::New`] or [`Panic::Clone`] while every new instance or every copy panics.
+    static EVERYWHERE: Cell<Panic> = const { Cell::new(Panic::None) };
 }
 
-/// Runs the work while every new instance ([`Fault::New`]) or every copy ([`Fault::Clone`]) panics.
-pub fn while_all_break<T>(fault: Fault, work: impl FnOnce() -> T) -> T {
-    EVERYWHERE.set(fault);
+/// Runs the work while every new instance ([`Panic::New`]) or every copy ([`Panic::Clone`]) panics.
+pub fn while_all_break<T>(panic: Panic, work: impl FnOnce() -> T) -> T {
+    EVERYWHERE.set(panic);
     let result = work();
-    EVERYWHERE.set(Fault::None);
+    EVERYWHERE.set(Panic::None);
     result
 }
 
-/// Panics in the method that the parameter `fault` selects.
+/// Panics in the method that the parameter `panic` selects.
 pub struct Faulty {
-    fault: i32,
+    panic: i32,
     number: f64,
     state: f64,
     boolean: bool,
@@ -58,7 +58,7 @@ pub struct Faulty {
     memory: Memory,
 }
 
-/// A `memory` field that stores the fault, so that visiting it can panic too.
+/// A `memory` field that stores the parameter, so that visiting it can panic too.
 #[derive(Clone)]
 struct Memory(i32);
 
@@ -79,58 +79,58 @@ impl Drop for SecondBomb {
 }
 
 impl Faulty {
-    fn panic_if(&self, fault: Fault) {
-        check(self.fault, fault);
+    fn panic_if(&self, panic: Panic) {
+        check(self.panic, panic);
     }
 
     fn read<T>(&self, value: T) -> T {
-        self.panic_if(Fault::Read);
-        if self.fault == Fault::NoMessage as i32 {
+        self.panic_if(Panic::Read);
+        if self.panic == Panic::NoMessage as i32 {
             std::panic::panic_any(7);
         }
-        if self.fault == Fault::Bomb as i32 {
+        if self.panic == Panic::Bomb as i32 {
             std::panic::panic_any(Bomb);
         }
         value
     }
 }
 
-fn check(fault: i32, here: Fault) {
-    assert!(fault != here as i32, "fault #{here:?} at 100%s");
+fn check(panic: i32, here: Panic) {
+    assert!(panic != here as i32, "panic #{here:?} at 100%s");
 }
 
 impl Saved for Memory {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
-        check(self.0, Fault::Memory);
+        check(self.0, Panic::Memory);
         self.0.visit(visitor);
     }
 }
 
 variables! { for Faulty, memory in memory;
     /// Input
-    u = input(&NUMBER) in number then |faulty| { faulty.panic_if(Fault::Then); };
+    u = input(&NUMBER) in number then |faulty| { faulty.panic_if(Panic::Then); };
     /// Output
     y = output(&NUMBER) by |faulty| faulty.read(0.5);
     /// Where it breaks
-    fault = parameter(&INTEGER) in fault then |faulty| { faulty.memory = Memory(faulty.fault); };
+    panic = parameter(&INTEGER) in panic then |faulty| { faulty.memory = Memory(faulty.panic); };
     /// An integer
     n = output(&INTEGER) by |faulty| faulty.read(3);
     /// A Boolean
-    boolean = input(&BOOLEAN) in boolean then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| faulty.read(faulty.boolean);
+    boolean = input(&BOOLEAN) in boolean then |faulty| { faulty.panic_if(Panic::Then); } by |faulty| faulty.read(faulty.boolean);
     /// A string
-    string = input(&STRING) in string then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| {
-        faulty.panic_if(Fault::ReadString);
+    string = input(&STRING) in string then |faulty| { faulty.panic_if(Panic::Then); } by |faulty| {
+        faulty.panic_if(Panic::ReadString);
         faulty.string.clone()
     };
     /// A state
-    x = local(&NUMBER).state() in state then |faulty| { faulty.panic_if(Fault::Then); };
+    x = local(&NUMBER).state() in state then |faulty| { faulty.panic_if(Panic::Then); };
     /// Its rate
     der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |faulty| faulty.read(0.0);
 }
 
 impl Clone for Faulty {
     fn clone(&self) -> Self {
-        check(EVERYWHERE.get() as i32, Fault::Clone);
+        check(EVERYWHERE.get() as i32, Panic::Clone);
         Self { string: self.string.clone(), memory: self.memory.clone(), ..*self }
     }
 }
@@ -138,7 +138,7 @@ impl Clone for Faulty {
 impl Drop for Faulty {
     fn drop(&mut self) {
         if !std::thread::panicking() {
-            self.panic_if(Fault::Drop);
+            self.panic_if(Panic::Drop);
         }
     }
 }
@@ -147,34 +147,34 @@ impl Model for Faulty {
     const INFO: Info = info!("Faulty", "faulty");
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        check(EVERYWHERE.get() as i32, Fault::New);
+        check(EVERYWHERE.get() as i32, Panic::New);
         let memory = Memory(0);
-        Ok(Self { fault: 0, number: 0.0, state: 0.0, boolean: false, string: String::new(), memory })
+        Ok(Self { panic: 0, number: 0.0, state: 0.0, boolean: false, string: String::new(), memory })
     }
 
     fn update(&mut self) -> Result<(), Error> {
-        self.panic_if(Fault::Update);
+        self.panic_if(Panic::Update);
         Ok(())
     }
 
     fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
-        self.panic_if(Fault::Initialize);
+        self.panic_if(Panic::Initialize);
         Ok(())
     }
 
     fn calculate(&mut self, _: f64) {
-        self.panic_if(Fault::Calculate);
+        self.panic_if(Panic::Calculate);
     }
 
     fn log(&mut self) -> Option<&mut Log> {
-        self.panic_if(Fault::Log);
+        self.panic_if(Panic::Log);
         None
     }
 }
 
 impl CoSimulation for Faulty {
     fn step(&mut self, _: Step) -> Result<Stepped, Error> {
-        self.panic_if(Fault::Step);
+        self.panic_if(Panic::Step);
         Ok(Stepped::Done)
     }
 }
@@ -184,44 +184,44 @@ impl ModelExchange for Faulty {
     const STEP_COMPLETED: bool = true;
 
     fn indicators(&self, _: &mut [f64]) {
-        self.panic_if(Fault::Indicators);
+        self.panic_if(Panic::Indicators);
     }
 
     fn event(&mut self, _: f64) -> Result<Event, Error> {
-        self.panic_if(Fault::Event);
+        self.panic_if(Panic::Event);
         Ok(Event::default())
     }
 
     fn continuous_time_entered(&mut self) {
-        self.panic_if(Fault::ContinuousTimeEntered);
+        self.panic_if(Panic::ContinuousTimeEntered);
     }
 
     fn step_completed(&mut self, _: f64) -> StepCompleted {
-        self.panic_if(Fault::StepCompleted);
+        self.panic_if(Panic::StepCompleted);
         StepCompleted::default()
     }
 
     fn nominals(&self, _: &mut [f64]) {
-        self.panic_if(Fault::Nominals);
+        self.panic_if(Panic::Nominals);
     }
 }
 
 impl Partials for Faulty {
     fn partial(&self, _: Name, _: Name) -> Option<f64> {
-        self.panic_if(Fault::Partial);
+        self.panic_if(Panic::Partial);
         Some(1.0)
     }
 }
 
 impl InputDerivatives for Faulty {
     fn set_input_derivative(&mut self, _: Name, _: u32, _: f64) {
-        self.panic_if(Fault::InputDerivative);
+        self.panic_if(Panic::InputDerivative);
     }
 }
 
 impl OutputDerivatives for Faulty {
     fn output_derivative(&self, _: Name, _: u32) -> f64 {
-        self.panic_if(Fault::OutputDerivative);
+        self.panic_if(Panic::OutputDerivative);
         0.0
     }
 }

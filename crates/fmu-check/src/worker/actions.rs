@@ -1,4 +1,4 @@
-//! Executes the steps of a call sequence.
+//! Executes the actions of a call sequence.
 
 use super::executor::{Executor, Instance, THREADS};
 use super::job::{EVALUATED, EXECUTED, Last};
@@ -6,7 +6,7 @@ use super::logger::{messages, text_at};
 use super::memory::{self, in_fmu};
 use super::work::wait_for_debugger;
 use super::{integrate, locked, measure};
-use crate::call_sequence::{NULL_INSTANCE, Numbered, Outcome, Step, step_name};
+use crate::call_sequence::{Action, NULL_INSTANCE, Numbered, Outcome, action_name};
 use fmi_abi::c_types::c_void;
 use std::collections::HashMap;
 use std::sync::Barrier;
@@ -14,17 +14,17 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 impl Executor {
-    /// Executes steps. Writes their outcomes to the file if `report` is set, otherwise returns them. Of repeated steps, only the
+    /// Executes actions. Writes their outcomes to the file if `report` is set, otherwise returns them. Of repeated actions, only the
     /// outcomes of the last repetition are written.
     pub fn execute(&self, sequence: &[Numbered], report: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for numbered in sequence {
             let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
             if report && self.stop_before == Some(numbered.id) {
-                wait_for_debugger(&step_name(&numbered.step));
+                wait_for_debugger(&action_name(&numbered.action));
             }
-            match &numbered.step {
-                Step::Repeat(times, steps) => {
+            match &numbered.action {
+                Action::Repeat(times, actions) => {
                     let begin = Instant::now();
                     memory::KEEP.store(true, Ordering::Relaxed);
                     let (mut done, mut last) = (0, Vec::new());
@@ -33,7 +33,7 @@ impl Executor {
                     let patience = |done: usize| if done < EVALUATED { 4.0 } else { 1.0 };
                     let seconds = || begin.elapsed().as_secs_f64();
                     while done < *times && seconds() < patience(done) * self.setting.repetitions {
-                        last = self.execute(steps, false);
+                        last = self.execute(actions, false);
                         done += 1;
                         if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
                             break;
@@ -46,7 +46,7 @@ impl Executor {
                         last.iter().for_each(|outcome| self.write(outcome));
                     }
                 }
-                Step::Parallel(sequences) => {
+                Action::Parallel(sequences) => {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     THREADS.store(true, Ordering::Relaxed);
                     // On a busy machine, a thread could otherwise end before the next one begins.
@@ -62,7 +62,7 @@ impl Executor {
                     THREADS.store(false, Ordering::Relaxed);
                     memory::KEEP.store(false, Ordering::Relaxed);
                 }
-                step => self.execute_step(step, &mut outcome),
+                action => self.execute_action(action, &mut outcome),
             }
             if report {
                 self.write(&outcome);
@@ -73,11 +73,11 @@ impl Executor {
         outcomes
     }
 
-    /// Executes a step that contains no other steps.
-    fn execute_step(&self, step: &Step, outcome: &mut Outcome) {
-        match step {
-            Step::Make(index, make) => self.make(*index, make, outcome),
-            Step::Free(index) => {
+    /// Executes an action that contains no other actions.
+    fn execute_action(&self, action: &Action, outcome: &mut Outcome) {
+        match action {
+            Action::Make(index, make) => self.make(*index, make, outcome),
+            Action::Free(index) => {
                 let null = (*index == NULL_INSTANCE).then_some(Instance {
                     handle: 0,
                     environment: 0,
@@ -96,21 +96,21 @@ impl Executor {
                 });
                 (outcome.log, outcome.strays) = messages(instance.environment);
             }
-            Step::Version(name) => {
+            Action::Version(name) => {
                 let functions = self.find(self.setting.libraries[0].is_some(), name);
                 outcome.missing = functions.is_none();
                 // SAFETY: these functions have no arguments and return a string.
                 outcome.text =
                     functions.and_then(|functions| unsafe { text_at(in_fmu(|| functions.version(name))) });
             }
-            Step::Call { instance, function, args } => self.call(*instance, function, args, outcome),
-            Step::Integrate(instance, how) => {
+            Action::Call { instance, function, args } => self.call(*instance, function, args, outcome),
+            Action::Integrate(instance, how) => {
                 memory::KEEP.store(true, Ordering::Relaxed);
                 integrate::integrate(self, *instance, how, outcome);
                 memory::KEEP.store(false, Ordering::Relaxed);
             }
-            Step::Measure => outcome.measured = Some(measure::now()),
-            Step::Unload => {
+            Action::Measure => outcome.measured = Some(measure::now()),
+            Action::Unload => {
                 let mut loaded: Vec<_> =
                     locked(&self.libraries).iter_mut().filter_map(Option::take).collect();
                 loaded.dedup_by_key(|library| std::ptr::from_ref(*library));
@@ -126,16 +126,16 @@ impl Executor {
                     libc::fflush(std::ptr::null_mut());
                 });
             }
-            Step::Quit => {
+            Action::Quit => {
                 self.write(&Last { bytes: HashMap::new() });
                 in_fmu(|| std::process::exit(EXECUTED))
             }
-            Step::Repeat(..)
-            | Step::Parallel(_)
-            | Step::FreshProcess
-            | Step::Elsewhere(_)
-            | Step::Environment
-            | Step::Copies(..) => {}
+            Action::Repeat(..)
+            | Action::Parallel(_)
+            | Action::FreshProcess
+            | Action::Elsewhere(_)
+            | Action::Environment
+            | Action::Copies(..) => {}
         }
     }
 }
