@@ -108,6 +108,10 @@ macro_rules! symbols {
             }
         }
     };
+    // Each row of `fmi2_functions!` and `fmi3_functions!` in fmi-abi becomes an exported function. For example, the row
+    // `fmi2DoStep "C" ...` becomes the symbol `fmi2DoStep`, which calls `fmu_export::fmi2::fmi2DoStep` for this model. That
+    // function is generated from the same row, by `c_functions!`; its body is the `fmi2DoStep` of fmi2/co_simulation.rs, and
+    // `fmi3DoStep` is found in the same way.
     (
         @each $module:ident $model:ty;
         $standard:ident $handle:ident
