@@ -29,50 +29,29 @@ def fmu(testbed):
     "arguments, message",
     [
         ({"inputs": {"thet1": 0.0}}, 'has no variable "thet1"; did you mean "theta1"?'),
-        ({"outputs": ["Roll_Rate"]}, 'has no variable "Roll_Rate"; did you mean "roll_rate"?'),
         ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or one value"),
         ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
         ({"inputs": {"theta1": ["a"] * 11}}, "theta1: the values are not numbers"),
-        ({"inputs": {"k1": TIME}}, "k1 is not an input but a fixed parameter; give it a start value"),
-        ({"inputs": {"roll": TIME}}, "roll is not an input but a continuous output"),
         (
             {"start": {"k1": [[1.0]]}},
             "the start value of k1 has the shape (1, 1); it must be one number for all runs or instances, or (n,) with one number "
             "for each",
         ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
-        ({"start": {"M": 2.5}}, "M is an integer and cannot be 2.5"),
-        ({"start": {"use_omega": 2}}, "use_omega is a Boolean and cannot be 2"),
-        ({"start": {"k1": [1, 2], "k2": [1, 2, 3]}}, "k1 is given for 2 runs, k2 for 3"),
         ({"start": {"k1": [1, 2]}, "inputs": {"theta1": np.zeros((3, 11))}}, "theta1 is given for 3 runs, k1 for 2"),
         ({"measures": ["pek"]}, 'there is no measure "pek"; there are min, max, peak, time_of_peak, mean, rms, end'),
         ({"every": 0}, "every must be at least 1, it is 0"),
         ({"threads": 0}, "threads must be at least 1, it is 0"),
         ({"threads": -2}, "threads must be at least 1, it is -2"),
         ({"threads": 1.5}, "threads must be an integer, it is 1.5"),
-        ({"start": {"roll": 1.0}}, "roll is read-only: it is calculated by the FMU and has no start value"),
-        ({"outputs": ["nope"]}, 'PitchRollWristTestbed has no variable "nope"\n'),
-        ({"time": [0.0]}, "time has 1 values"),
         ({"time": [[0.0, 1.0]]}, "time must have one dimension"),
         ({"time": [0.0, 0.1, np.nan]}, "time[2] is NaN; times must be finite"),
-        ({"time": [0.0, 0.2, 0.2]}, "time[2] is 0.2, which is not after time[1], 0.2"),
-        ({"time": [0.0, 3.41e-200, -5e-324]}, "time[2] is -5e-324, which is not after time[1], 3.41e-200"),
     ],
 )
 def test_invalid_arguments(fmu, arguments, message):
     with pytest.raises(ValueError) as raised:
         fmu.run(**{"time": TIME, "outputs": ["roll"], **arguments})
-    assert message in f"{raised.value}\n"
-
-
-def test_input_derivatives_of_fmi3(fmu):
-    slopes = {"theta1": np.zeros(11)}
-    if fmu.fmi_version == "2.0":
-        with pytest.raises(ValueError, match="k1 is not a Real input"):
-            fmu.run(TIME, outputs=["roll"], input_derivatives={"k1": 1.0})
-    else:
-        with pytest.raises(ValueError, match="PitchRollWristTestbed takes no input derivatives"):
-            fmu.run(TIME, outputs=["roll"], input_derivatives=slopes)
+    assert message in str(raised.value)
 
 
 def test_rejected_runs_do_not_affect_the_others(fmu):
@@ -95,37 +74,25 @@ def test_rejected_runs_do_not_affect_the_others(fmu):
     assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
 
 
-# FMPy contains libraries for other systems. Bytes 18 and 19 of an ELF header, e_machine, select the processor.
+# FMPy contains libraries for other systems, which linkers wrote. The Rust tests write headers themselves.
 FMPY = Path(fmpy.__file__).parent
 FOREIGN_LIBRARIES = {
-    "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
-    "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
-    "macOS on x86_64 and aarch64": lambda _: (FMPY / "logging/darwin64/logging.dylib").read_bytes(),
-    "Linux on loongarch64": lambda library: library[:18] + bytes([2, 1]) + library[20:],
-    "Linux on riscv64": lambda library: library[:18] + bytes([243, 0]) + library[20:],
+    "Windows on x86_64": "logging/win64/logging.dll",
+    "Windows on x86": "logging/win32/logging.dll",
+    "macOS on x86_64 and aarch64": "logging/darwin64/logging.dylib",
 }
 
 
 @pytest.mark.parametrize("made_for", FOREIGN_LIBRARIES)
 def test_a_library_of_another_machine(tmp_path, testbed, made_for):
     def change(name, content):
-        return FOREIGN_LIBRARIES[made_for](content) if name.startswith("binaries/") else content
+        return (FMPY / FOREIGN_LIBRARIES[made_for]).read_bytes() if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "foreign.fmu", change)
     this = f"{platform.system()} on {platform.machine()}"
     with pytest.raises(fmu_run.FmuError) as raised:
         fmu_run.Fmu(path)
     assert str(raised.value).endswith(f"its library cannot be loaded: it is for {made_for}, and this is {this}")
-
-
-def test_a_damaged_library(tmp_path, testbed):
-    def change(name, content):
-        return content[:200] if name.startswith("binaries/") else content
-
-    path = repacked(testbed, tmp_path / "damaged.fmu", change)
-    # The last part of the message comes from the operating system.
-    with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
-        fmu_run.Fmu(path)
 
 
 def test_an_execution_tool(tmp_path, faulty_fmu):
@@ -146,22 +113,6 @@ def test_a_closed_fmu(testbed):
     with pytest.raises(fmu_run.FmuError, match="the FMU is closed"):
         fmu.run(TIME, outputs=["roll"])
     assert repr(fmu).endswith("variables, closed>")
-
-
-def test_units_of_declared_types(faulty_fmu, faulty_fmu3):
-    by_name = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
-    units_fmi3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
-    for path, units in ((faulty_fmu, by_name), (faulty_fmu3, units_fmi3)):
-        with fmu_run.Fmu(path) as fmu:
-            assert {name: fmu.variables[name].unit for name in units} == units
-
-
-def test_an_undefined_declared_type(faulty_fmu, tmp_path):
-    def change(name, content):
-        return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Undefined"/>')
-
-    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "undefined.fmu", change)) as fmu:
-        assert fmu.variables["y"].unit is None and fmu.run(TIME, outputs=["y"]).ok.all()
 
 
 def test_start_values_with_units(fmu):
@@ -185,23 +136,14 @@ def test_start_values_with_units(fmu):
         fmu.run(time, inputs={"theta1": (0.0, "grad")}, outputs=["roll"])
     held = fmu.instances(2, start={"theta3_start": (30.0, "deg"), "start_at_rest": "false"})
     np.testing.assert_allclose(held.get("theta3"), np.pi / 6, rtol=1e-15)
-    for start, message in [
-        ({"k1": (1.9, "N/m")}, 'k1 can be given in N.m/rad or N.m/deg, not in "N/m"'),
-        ({"M": (3, "kg")}, "M has no unit, its values cannot be in kg"),
-    ]:
-        with pytest.raises(ValueError, match=re.escape(message)):
-            fmu.run(time, start=start, outputs=outputs)
-
-
-def test_suggested_names(fmu):
-    for wrong, right in [("theta", "theta1"), ("rolls", "roll"), ("TAU2", "tau2"), ("pitch_angle", "pitch")]:
-        with pytest.raises(ValueError, match=f'did you mean "{right}"'):
-            fmu.run(TIME, outputs=[wrong])
+    with pytest.raises(ValueError, match="M has no unit, its values cannot be in kg"):
+        fmu.run(time, start={"M": (3, "kg")}, outputs=outputs)
 
 
 def test_other_types(faulty_fmu):
     with fmu_run.Fmu(faulty_fmu) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"
+        assert fmu.variables["slope"].unit == "m/s" and fmu.variables["count"].unit is None
         counts = np.arange(11) - 5
         runs = fmu.run(
             TIME,
@@ -216,16 +158,6 @@ def test_other_types(faulty_fmu):
         for call, message in [
             (lambda: one.get(["label", "y"]), "label is not a number"),
             (lambda: one.texts("y"), "y is a number, not a string"),
-            (
-                lambda: fmu.run(TIME, outputs=["y"], start={"behaviour": "Glad"}),
-                "behaviour is one of Good, SilentError, its start",
-            ),
-            (
-                lambda: fmu.run(TIME, outputs=["y"], start={"flag": "on"}),
-                "flag is a Boolean, its start value cannot be",
-            ),
-            (lambda: one.set("count", 2.5), "count is an integer and cannot be 2.5"),
-            (lambda: one.set(["slope", "flag"], [1.0, 2.0]), "flag is a Boolean and cannot be 2"),
             (lambda: one.set("slope", None), "None is not a number"),
             (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is not a number"),
             (lambda: fmu.run(TIME, outputs=["y"], start={"slope": None}), "slope: None is not a number"),
@@ -315,18 +247,7 @@ def test_progress(testbed):
         assert fmu.run(TIME, outputs=["roll"]).count == 1
 
 
-def test_the_interface_type_must_exist(tmp_path, faulty_fmu):
-    def change(name, content):
-        return content.replace(b"<CoSimulation", b"<ModelExchange")
-
-    with fmu_run.Fmu(repacked(faulty_fmu, tmp_path / "model_exchange.fmu", change)) as fmu:
-        for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"], interface="co_simulation"), fmu.instances):
-            with pytest.raises(
-                fmu_run.FmuError, match="no Co-Simulation, only Model Exchange; `run` of this FMU integrates it"
-            ):
-                call()
-        # The run fails, because the library itself only supports Co-Simulation.
-        assert list(fmu.run([0.0, 1.0], outputs=["y"]).errors) == [0]
+def test_the_interface_type_must_exist(faulty_fmu):
     with fmu_run.Fmu(faulty_fmu) as fmu, pytest.raises(fmu_run.FmuError, match="has no Model Exchange"):
         fmu.run([0.0, 1.0], outputs=["y"], interface="model_exchange")
 

@@ -4,7 +4,9 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 mod built;
+mod endings;
 mod opening;
+mod requests;
 mod ssp;
 
 use built::{built, opened, opened_with};
@@ -102,21 +104,24 @@ fn the_tolerance_of_the_default_experiment_is_passed() {
             let batch = Batch {
                 time: &time,
                 inputs: vec![("u", Trajectory::Constant(1.0))],
-                outputs: vec!["y"],
+                outputs: vec!["y", "tolerance", "stop"],
                 every: Some(10),
                 tolerance,
                 ..Batch::default()
             };
             let runs = fmu.run(&batch, &Watch::default()).unwrap();
             assert!((runs.trajectories[1] - expected).abs() < 1e-12, "{standard} {tolerance:?}");
+            assert_eq!(runs.trajectories[2..], [passed, passed, 1.0, 1.0]);
             let setup = Setup { tolerance, stop_time: Some(3.0), ..Setup::default() };
             let mut one = fmu.instances(&setup).unwrap();
             let mut values = [0.0; 2];
             one.get(&fmu.select(&["tolerance", "stop"]).unwrap(), &mut values);
             assert_eq!(values, [passed, 3.0]);
         }
-        let setup = Setup { tolerance: Tolerance::Value(0.0), ..Setup::default() };
-        assert!(matches!(fmu.instances(&setup), Err(Error::Request(why)) if why.contains("above 0")));
+        for wrong in [0.0, -1e-3, f64::INFINITY] {
+            let setup = Setup { tolerance: Tolerance::Value(wrong), ..Setup::default() };
+            assert!(matches!(fmu.instances(&setup), Err(Error::Request(why)) if why.contains("above 0")));
+        }
     }
 }
 
@@ -536,14 +541,25 @@ fn exact_values_are_start_values_inputs_and_outputs() {
         ("wide", Value::Real(1e17), "may not be the one that is meant"),
         ("wide", Value::Integer(1 << 63), "cannot be 9223372036854775808"),
         ("natural", Value::Integer(-1), "cannot be -1"),
+        (
+            "natural",
+            Value::Integer(1 << 64),
+            "from 0 to 18446744073709551615 and cannot be 18446744073709551616",
+        ),
         ("label", Value::Integer(1), "is a string, its value cannot be 1"),
         ("label", Value::from("a\0"), "character NUL"),
         ("bytes", Value::from("text"), "is binary, its value cannot be"),
         ("u", Value::Real(1.0), "set it with set"),
         ("wide_out", Value::Integer(1), "read-only"),
     ] {
-        let found = two.set_values(name, &[value], None).unwrap_err().to_string();
+        let found = two.set_values(name, std::slice::from_ref(&value), None).unwrap_err().to_string();
         assert!(found.contains(why), "{name}: {found}");
+        if name != "u" {
+            let start = vec![(name, Start::Value(&value))];
+            let batch = Batch { time: &time, start, outputs: vec!["y"], ..Batch::default() };
+            let found = fmu.run(&batch, &Watch::default()).unwrap_err().to_string();
+            assert!(found.contains(why), "{name}: {found}");
+        }
     }
     let mut rounded = [0.0; 2];
     two.get(&fmu.select(&["wide_out"]).unwrap(), &mut rounded);
@@ -617,4 +633,6 @@ fn structural_parameters_change_the_sizes_of_arrays() {
     assert!(wrong(vec![("size", Start::Same(2.0)), ("vector[3]", Start::Same(0.0))]).contains("no variable"));
     let set = one.set(&one.system().select(&["size"]).unwrap(), &[3.0], None).unwrap_err().to_string();
     assert!(set.contains("size is a structural parameter"), "{set}");
+    let start = one.start_from(&[("size", Start::Same(3.0))]).unwrap_err().to_string();
+    assert_eq!(start, "size is a structural parameter; set it when the instances are created");
 }

@@ -3,7 +3,7 @@
 use crate::built::built;
 use crate::end;
 use fmi_abi::write::zip;
-use fmu_run::{Batch, Composition, Error, Fmu, Order, Setup, Standard, System, Trajectory, Watch};
+use fmu_run::{Batch, Composition, Error, Fmu, Interface, Order, Setup, Standard, System, Trajectory, Watch};
 use std::path::Path;
 
 fn opened(path: &Path) -> Result<System, String> {
@@ -125,6 +125,64 @@ fn libraries_have_plain_names() {
         let outside = [("modelIdentifier=\"integrator\"", "modelIdentifier=\"../integrator\"")];
         let why = opened(&built("plain", standard, directory.path(), &outside)).unwrap_err();
         assert!(why.contains("modelIdentifier \"../integrator\" is not the name of a library"), "{why}");
+    }
+}
+
+/// Other tests determine the platform from files that linkers wrote; this one is about the message.
+#[test]
+fn a_library_of_another_platform_is_named() {
+    let mach = [&[0xcf, 0xfa, 0xed, 0xfe, 0x0c, 0, 0, 1][..], &[0; 24]].concat();
+    let universal = [0xcafe_babe, 2, 0x0100_0007, 0, 48, 0, 0, 0x0100_000c, 0, 48, 32, 0];
+    let universal = [universal.map(u32::to_be_bytes).concat(), mach].concat();
+    let mut pe = vec![0; 0x40 + 4 + 20 + 112];
+    pe[..2].copy_from_slice(b"MZ");
+    pe[0x3c] = 0x40;
+    pe[0x40..0x46].copy_from_slice(b"PE\0\0\x64\x86");
+    pe[0x54] = 112;
+    pe[0x58..0x5a].copy_from_slice(&[0x0b, 2]);
+    for (standard, platform) in [(Standard::Fmi2, "linux64"), (Standard::Fmi3, "x86_64-linux")] {
+        let directory = tempfile::tempdir().unwrap();
+        let archive = std::fs::File::open(built("plain", standard, directory.path(), &[])).unwrap();
+        zip::ZipArchive::new(archive).unwrap().extract(directory.path()).unwrap();
+        let library = directory.path().join("binaries").join(platform).join("integrator.so");
+        let own = std::fs::read(&library).unwrap();
+        // The field e_machine of the ELF header selects the processor.
+        let elf = |machine: [u8; 2]| [&own[..18], &machine, &own[20..]].concat();
+        let damaged = format!("dlopen failed: {}: file too short", library.display());
+        let here = "and this is Linux on x86_64";
+        for (bytes, why) in [
+            (elf([2, 1]), format!("it is for Linux on loongarch64, {here}")),
+            (elf([243, 0]), format!("it is for Linux on riscv64, {here}")),
+            (universal.clone(), format!("it is for macOS on x86_64 and aarch64, {here}")),
+            (pe.clone(), format!("it is for Windows on x86_64, {here}")),
+            (own[..60].to_vec(), damaged),
+        ] {
+            std::fs::write(&library, bytes).unwrap();
+            let found = opened(directory.path()).unwrap_err();
+            assert!(found.ends_with(&format!("its library cannot be loaded: {why}")), "{found}");
+        }
+    }
+}
+
+#[test]
+fn the_interface_type_must_exist() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |fmu: &System, interface| {
+        let batch = Batch { time: &[0.0, 1.0], outputs: vec!["y"], interface, ..Batch::default() };
+        fmu.run(&batch, &Watch::default()).map(|runs| runs.errors.len())
+    };
+    for standard in [Standard::Fmi2, Standard::Fmi3] {
+        let fmu = opened(&built("plain", standard, directory.path(), &[])).unwrap();
+        let why = Err(Error::Fmu("Foreign has no Model Exchange".to_owned()));
+        assert_eq!(run(&fmu, Some(Interface::ModelExchange)), why);
+        let changes = [("<CoSimulation", "<ModelExchange")];
+        let fmu = opened(&built("plain", standard, directory.path(), &changes)).unwrap();
+        let integrates = "`run` of this FMU integrates it, but in systems it is not supported";
+        let why = format!("Foreign has no Co-Simulation, only Model Exchange; {integrates}");
+        assert_eq!(run(&fmu, Some(Interface::CoSimulation)), Err(Error::Fmu(why.clone())));
+        assert_eq!(fmu.instances(&Setup::default()).map(drop), Err(Error::Fmu(why)));
+        // The run fails, because the library itself supports only Co-Simulation.
+        assert_eq!(run(&fmu, None), Ok(1));
     }
 }
 
