@@ -113,10 +113,7 @@ def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
 @pytest.mark.parametrize(
     "connections, order, message",
     [
-        ({"testbed.pich": "controller.pitch"}, "jacobi", 'system has no variable "testbed.pich"; did you mean "testbed.pitch"?'),
         ({"testbed.pitch": "controller.tau1"}, "jacobi", "testbed.pitch cannot feed controller.tau1: the output is in rad, the input in N.m"),
-        ({"controller.pitch": "testbed.theta1"}, "jacobi", "controller.pitch is input, not output"),
-        ({"testbed.pitch": "testbed.roll"}, "jacobi", "testbed.roll is output, not input"),
         ({"testbed.pitch": ["controller.pitch", "controller.pitch"]}, "jacobi", "controller.pitch is fed twice"),
         ({}, "gauss", "order must be 'dependencies' or 'jacobi', it is 'gauss'"),
     ],
@@ -131,13 +128,8 @@ def test_connected_inputs_cannot_be_set() -> None:
     with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
         loop = fmu_run.System({"controller": controller, "testbed": testbed}, CONNECTIONS)
         pair = loop.instances()
-        for call in (
-            lambda: pair.set("testbed.theta1", 1.0),
-            lambda: loop.run([0, 1e-3], inputs={"testbed.theta1": 1.0}, outputs=["testbed.roll"]),
-            lambda: loop.run([0, 1e-3], start={"testbed.theta1": 1.0}, outputs=["testbed.roll"]),
-        ):
-            with pytest.raises(ValueError, match="testbed.theta1 is fed by controller.theta1, it cannot be set"):
-                call()
+        with pytest.raises(ValueError, match="testbed.theta1 is fed by controller.theta1, it cannot be set"):
+            pair.set("testbed.theta1", 1.0)
         with pytest.raises(ValueError, match="of one FMU and not of a system"):
             pair.directional_derivative("testbed.tau1", "controller.roll_ref", 1.0)
         with pytest.raises(fmu_run.FmuError, match="system is a system; systems run in Co-Simulation only"):
@@ -145,17 +137,6 @@ def test_connected_inputs_cannot_be_set() -> None:
         # The error message of an FMU contains the name of its component.
         runs = loop.run([0, 1e-3], start={"testbed.k1": [-1.0, 90.0]}, outputs=["testbed.roll"])
         assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
-
-
-def test_algebraic_loops(faulty_fmu) -> None:
-    """The model description lists no dependencies, so each output may depend on every input."""
-    with fmu_run.Fmu(faulty_fmu) as fmu:
-        with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
-            fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
-        delayed = fmu_run.System({"a": fmu}, {"a.instances": "a.count"}, order="jacobi")
-        assert delayed.run([0.0, 1.0], outputs=["a.count"])["a.count"][0, 1] == 1
-        with pytest.raises(fmu_run.FmuError, match="only one instance per process"):
-            fmu_run.System({"a": fmu, "b": fmu})
 
 
 def rewritten(directory, change) -> str:
@@ -222,19 +203,9 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     assert np.array_equal(again["pitch"], found["pitch"]) and np.ptp(again["laws.controller.theta1"]) > 0.1
 
 
-@pytest.mark.parametrize(
-    "old, new, message",
-    [
-        ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is not well-formed XML"),
-        ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: there is no readable resources/other.fmu in it"),
-        ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is not an FMU"),
-        ("resources/testbed.ssv", "resources/none.ssv", "there is no readable resources/none.ssv"),
-        ("<ssd:Component name=\"testbed\"", "<ssd:Component", "a Component lacks name"),
-    ],
-)  # fmt: skip
-def test_unsupported_ssps(old, new, message, tmp_path) -> None:
-    with pytest.raises(fmu_run.FmuError, match=message):
-        fmu_run.System(rewritten(tmp_path, lambda text: text.replace(old, new)))
+def test_unsupported_ssps(tmp_path) -> None:
+    with pytest.raises(fmu_run.FmuError, match="component testbed: there is no readable resources/other.fmu in it"):
+        fmu_run.System(rewritten(tmp_path, lambda text: text.replace("/prw_testbed.fmu", "/other.fmu")))
     with pytest.raises(ValueError, match="an SSP has its own connections"):
         fmu_run.System(built("prw_closed_loop.ssp"), {})
 

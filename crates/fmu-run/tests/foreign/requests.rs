@@ -1,7 +1,11 @@
 //! Messages about requests that cannot be fulfilled: unknown names, wrong values and times.
 
+use crate::VERSIONS;
 use crate::built::{misbehaving, opened, opened_with};
-use fmu_run::{Batch, Measure, Setup, Standard, Start, System, Trajectory, Value, Watch, nearest};
+use fmu_run::{
+    Batch, Composition, Error, Measure, Order, Setup, Standard, Start, System, Trajectory, Value, Watch,
+    nearest,
+};
 
 /// Runs an FMU after a change of the batch, and returns the error.
 fn error<'a>(fmu: &System, change: impl FnOnce(&mut Batch<'a>)) -> String {
@@ -104,7 +108,7 @@ fn values_and_times_are_checked() {
 fn input_derivatives_need_the_capability_and_a_real_input() {
     let derivative_of =
         |name| move |batch: &mut Batch| batch.input_derivatives = vec![(name, Trajectory::Constant(1.0))];
-    for standard in [Standard::Fmi2, Standard::Fmi3] {
+    for standard in VERSIONS {
         let why = error(&opened("plain", standard), derivative_of("u"));
         assert_eq!(why, "Foreign takes no input derivatives (canInterpolateInputs of FMI 2.0)");
     }
@@ -158,4 +162,133 @@ fn units_of_declared_types() {
         );
     }
     assert_eq!(unit(Standard::Fmi2, &[], "slope").as_deref(), Some("m/s"));
+}
+
+/// Returns the message of a request that cannot be fulfilled.
+fn rejected<T>(result: Result<T, Error>) -> String {
+    match result {
+        Err(Error::Request(why)) => why,
+        Err(other) => panic!("{other:?}"),
+        Ok(_) => panic!("it is fulfilled"),
+    }
+}
+
+#[test]
+fn calls_of_instances_are_checked() {
+    for standard in VERSIONS {
+        let directional = [(
+            "canHandleVariableCommunicationStepSize=\"true\"",
+            match standard {
+                Standard::Fmi2 => "providesDirectionalDerivative=\"true\"",
+                Standard::Fmi3 => "providesDirectionalDerivatives=\"true\"",
+            },
+        )];
+        let fmu = opened_with("plain", standard, &directional).system().clone();
+        let setup = |count, start| Setup { count, start, ..Setup::default() };
+        assert_eq!(rejected(fmu.instances(&setup(0, vec![]))), "count must be at least 1");
+        let three = vec![("gain", Start::Each(&[1.0, 2.0, 3.0]))];
+        assert_eq!(rejected(fmu.instances(&setup(2, three))), "gain has 3 start values for 2 instances");
+        let mut two = fmu.instances(&setup(2, vec![])).unwrap();
+        for (size, shown) in [(-1e-3, "-0.001"), (0.0, "0"), (f64::NAN, "NaN")] {
+            let why = format!("the size of a step is {shown} s; it must be above 0 and finite");
+            assert_eq!(rejected(two.step(size, None)), why);
+        }
+        let late = "to is 0 s; it must be after the time of each instance, and instance 0 is at 0 s";
+        assert_eq!(rejected(two.step_to(0.0, None)), late);
+        let select = |name| fmu.select(&[name]).unwrap();
+        assert_eq!(rejected(two.set(&select("y"), &[1.0], None)), "y is read-only: it is an output");
+        let local = "tolerance is read-only: it is a local variable";
+        assert_eq!(rejected(two.set(&select("tolerance"), &[1.0], None)), local);
+        let known = "tolerance cannot be a known; expected an input, a parameter or a continuous state";
+        let mut derivatives = [0.0; 2];
+        let with_respect_to = (&select("tolerance"), &[1.0][..]);
+        assert_eq!(
+            rejected(two.directional_derivative(&select("y"), with_respect_to, &mut derivatives)),
+            known
+        );
+        let none: [Option<&[u8]>; 1] = [None];
+        assert_eq!(rejected(two.deserialize(&none)), "there are 1 states for 2 instances");
+        assert_eq!(rejected(two.deserialize(&[None, Some(&[][..])])), "the state of instance 1 is cut short");
+        assert_eq!(two.errors().count(), 0);
+    }
+}
+
+#[test]
+fn missing_capabilities_fail_no_instance() {
+    let fmu = misbehaving(Standard::Fmi2, &[]).system().clone();
+    let mut one = fmu.instances(&Setup::default()).unwrap();
+    let [y, slope] = [["y"], ["slope"]].map(|name| fmu.select(&name).unwrap());
+    let lacks = |what: &str| format!("FaultyFmu {what}");
+    assert_eq!(rejected(one.save()), lacks("cannot save its state (canGetAndSetFMUstate is not true)"));
+    assert_eq!(
+        rejected(one.deserialize(&[Some(b"12345678")])),
+        lacks("cannot deserialize a state (canSerializeFMUstate is not true)")
+    );
+    assert_eq!(
+        rejected(one.directional_derivative(&y, (&slope, &[1.0]), &mut [0.0])),
+        lacks("has no directional derivatives (providesDirectionalDerivative is not true)")
+    );
+    assert_eq!(
+        rejected(one.set_input_derivatives(&slope, &[1.0], None)),
+        lacks("takes no input derivatives (canInterpolateInputs of FMI 2.0)")
+    );
+    one.step(0.1, None).unwrap();
+    assert_eq!(one.errors().count(), 0);
+}
+
+#[test]
+fn connections_are_checked() {
+    for standard in VERSIONS {
+        let fmu = opened_with("plain", standard, &[]);
+        let connect = |connections: &[(&'static str, &'static str)], order| {
+            let components = vec![("a", &fmu), ("b", &fmu)];
+            let connections = connections.to_vec();
+            System::connect(&Composition { name: "s", components, connections, order })
+        };
+        for (from, to, why) in [
+            ("a.Y", "b.u", "s has no variable \"a.Y\"; did you mean \"a.y\"?"),
+            ("a.u", "b.u", "a.u is input, not output"),
+            ("a.y", "b.y", "b.y is output, not input"),
+        ] {
+            assert_eq!(rejected(connect(&[(from, to)], Order::Jacobi)), why);
+        }
+        let other_type = rejected(connect(&[("a.y", "b.valve")], Order::Jacobi));
+        assert!(other_type.starts_with("a.y cannot feed b.valve: the output is "), "{other_type}");
+        let twice = [("a.y", "b.u"), ("b.y", "b.u")];
+        assert_eq!(rejected(connect(&twice, Order::Jacobi)), "b.u is fed twice");
+        let connected = connect(&[("a.y", "b.u")], Order::Jacobi).unwrap();
+        let fed = "b.u is fed by a.y, it cannot be set";
+        let mut one = connected.instances(&Setup::default()).unwrap();
+        assert_eq!(rejected(one.set(&connected.select(&["b.u"]).unwrap(), &[1.0], None)), fed);
+        let of_run = |change: &dyn Fn(&mut Batch)| {
+            let mut batch = Batch { time: &[0.0, 1.0], outputs: vec!["b.y"], ..Batch::default() };
+            change(&mut batch);
+            rejected(connected.run(&batch, &Watch::default()))
+        };
+        assert_eq!(of_run(&|batch| batch.inputs = vec![("b.u", Trajectory::Constant(1.0))]), fed);
+        assert_eq!(of_run(&|batch| batch.start = vec![("b.u", Start::Same(1.0))]), fed);
+        let unknown = connected.select(&["a.y"]).unwrap();
+        assert_eq!(
+            rejected(one.get_output_derivatives(&unknown, &mut [0.0])),
+            "only Real variables have derivatives, of one FMU and not of a system"
+        );
+    }
+}
+
+/// The model description lists no dependencies, so each output may depend on every input.
+#[test]
+fn algebraic_loops_are_named() {
+    let fmu = misbehaving(Standard::Fmi2, &[]);
+    let connect = |components, order| {
+        let connections = vec![("a.instances", "a.count")];
+        System::connect(&Composition { name: "s", components, connections, order })
+    };
+    let found = rejected(connect(vec![("a", &fmu)], Order::Dependencies));
+    assert!(found.starts_with("there is an algebraic loop: a.instances -> a.count; "), "{found}");
+    assert!(found.ends_with("Order Jacobi passes them on a step later"), "{found}");
+    let delayed = connect(vec![("a", &fmu)], Order::Jacobi).unwrap();
+    let batch = Batch { time: &[0.0, 1.0], outputs: vec!["a.count"], every: Some(1), ..Batch::default() };
+    assert_eq!(delayed.run(&batch, &Watch::default()).unwrap().trajectories[1], 1.0);
+    let why = connect(vec![("a", &fmu), ("b", &fmu)], Order::Jacobi).unwrap_err().to_string();
+    assert!(why.contains("can have only one instance per process"), "{why}");
 }

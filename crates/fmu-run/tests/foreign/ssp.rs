@@ -485,6 +485,27 @@ fn start_values_in_force_are_shown() {
 }
 
 #[test]
+fn wrong_structures_are_errors() {
+    let of = |outer: &str, files: &[(&str, &str)]| {
+        opened(written(outer, "", files).path(), Order::Jacobi).unwrap_err().to_string()
+    };
+    let source = |source: &str| component("a", "").replace("source=\"m\"", source);
+    for (system, why) in [
+        (source("source=\"other.fmu\""), "component a: there is no readable other.fmu in it"),
+        (
+            source("type=\"application/x-ssp-definition\" source=\"m\""),
+            "component a is not an FMU but application/x-ssp-definition, which cannot be run",
+        ),
+        (component("a", "").replace("name=\"a\"", ""), "a Component lacks name"),
+    ] {
+        let found = of(&elements(&system), &[]);
+        assert!(found.contains(why), "{found}");
+    }
+    let found = of("", &[("SystemStructure.ssd", "<a")]);
+    assert!(found.contains("SystemStructure.ssd is not well-formed XML"), "{found}");
+}
+
+#[test]
 fn wrong_mappings_and_annotations() {
     let missing = "<ssd:ParameterMapping source=\"missing.ssm\"/>";
     for (mapping, why) in [
