@@ -53,24 +53,35 @@ pub(crate) fn apart<T, U>(
     // An array does not begin inside of the other one if the distance is at least the size.
     let [begin, other] = [pointer.addr(), values.addr()];
     let [size, written] = [length.wrapping_mul(size_of::<T>()), count.wrapping_mul(size_of::<U>())];
-    if other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
+    match other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
+        true => Ok(()),
+        false => reject_overlap((length, size_of::<T>(), name), (count, size_of::<U>(), argument)),
+    }
+}
+
+/// Fails unless one of the arrays is empty. An array that is larger than memory has another error. Each array is its length, the size of
+/// an element and its name.
+#[cold]
+#[inline(never)]
+fn reject_overlap(one: (usize, usize, &str), other: (usize, usize, &str)) -> Outcome {
+    let is_possible = |(length, size, _): (usize, usize, &str)| {
+        length.checked_mul(size).is_some_and(|all| all > 0 && all <= isize::MAX as usize)
+    };
+    if !is_possible(one) || !is_possible(other) {
         return Ok(());
     }
-    // Arrays that are larger than memory have another error.
-    let fits =
-        |length: usize, size: usize| length.checked_mul(size).is_some_and(|all| all <= isize::MAX as usize);
-    if size == 0 || written == 0 || !fits(length, size_of::<T>()) || !fits(count, size_of::<U>()) {
-        return Ok(());
-    }
-    reject(format!("the arrays {name} and {argument} overlap"))
+    reject(format!("the arrays {} and {} overlap", one.2, other.2))
 }
 
 /// Checks that an array of `count` elements has the `needed` length; `what` describes the elements in the message.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
-    if count == needed {
-        return Ok(());
-    }
+    if count == needed { Ok(()) } else { reject_length(what, needed, count) }
+}
+
+#[cold]
+#[inline(never)]
+fn reject_length(what: &str, needed: usize, count: usize) -> Outcome {
     reject(format!("there are {needed} {what}, the array has {count} elements"))
 }
 
