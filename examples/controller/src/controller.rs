@@ -26,8 +26,9 @@
 //! motor always moves so slowly that it can stop at its goal, its own motion does not cause a torque above the limit.
 
 use crate::motor::{Limits, MotorSetpoint};
-use crate::parameters::{InvalidParameter, Parameters};
+use crate::parameters::Parameters;
 use crate::wrist::{Kinematics, Motors, PitchRoll};
+use fmu_export::Error;
 use std::array::from_fn;
 
 /// Inputs of the controller, or their time derivatives.
@@ -113,7 +114,7 @@ impl Controller {
     ///
     /// # Errors
     /// Fails if the parameters are invalid.
-    pub fn new(parameters: Parameters) -> Result<Self, InvalidParameter> {
+    pub fn new(parameters: Parameters) -> Result<Self, Error> {
         parameters.check()?;
         Ok(Self {
             parameters,
@@ -134,7 +135,7 @@ impl Controller {
     ///
     /// # Errors
     /// Fails if the parameters are invalid; the schedule then stays unchanged.
-    pub fn parameters_changed(&mut self) -> Result<(), InvalidParameter> {
+    pub fn parameters_changed(&mut self) -> Result<(), Error> {
         self.parameters.check()?;
         if self.schedule.period != self.parameters.sample_time {
             let Schedule { next, .. } = self.schedule;

@@ -2,7 +2,7 @@
 
 use crate::controller::{Controller, Inputs, Schedule};
 use crate::motor::MotorSetpoint;
-use crate::parameters::{InvalidParameter, Parameters};
+use crate::parameters::Parameters;
 use crate::variables::Name;
 use fmu_export::{
     CoSimulation, DefaultExperiment, Error, Event, Events, Experiment, Info, InputDerivatives, Model,
@@ -12,12 +12,6 @@ use fmu_export::{
 saved!(for Inputs { reference, angle, rate, torque });
 saved!(for MotorSetpoint { angle, rate, acceleration });
 saved!(for Schedule { epoch, period, next });
-
-impl From<InvalidParameter> for Error {
-    fn from(error: InvalidParameter) -> Self {
-        Self::new(error.to_string())
-    }
-}
 
 impl Model for Controller {
     const INFO: Info = Info {
@@ -34,11 +28,11 @@ impl Model for Controller {
     };
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self::new(Parameters::DEFAULT)?)
+        Self::new(Parameters::DEFAULT)
     }
 
     fn update(&mut self) -> Result<(), Error> {
-        Ok(self.parameters_changed()?)
+        self.parameters_changed()
     }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {

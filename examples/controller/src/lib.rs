@@ -27,7 +27,7 @@
 //! let [pitch, roll] = wrist.wrist(motors.map(|motor| motor.angle));
 //! assert!((pitch - 0.5).abs() < 1e-9 && (roll - 1.0).abs() < 1e-9);
 //! assert!(motors.iter().all(|motor| motor.rate.abs() < 1e-9));
-//! # Ok::<(), prw_controller::parameters::InvalidParameter>(())
+//! # Ok::<(), fmu_export::Error>(())
 //! ```
 
 pub mod controller;

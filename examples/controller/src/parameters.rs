@@ -1,6 +1,6 @@
 //! Parameters of the controller and their ranges.
 
-use std::fmt;
+use fmu_export::Error;
 
 /// Smallest value of a parameter that must be positive. Together with [`LARGEST`], it ensures that products and
 /// quotients of parameters do not overflow.
@@ -57,7 +57,7 @@ impl Parameters {
     ///
     /// # Errors
     /// The message names the parameter and its valid range.
-    pub fn check(&self) -> Result<(), InvalidParameter> {
+    pub fn check(&self) -> Result<(), Error> {
         for (name, value) in [
             ("sample_time", self.sample_time),
             ("max_rate", self.max_rate),
@@ -66,7 +66,7 @@ impl Parameters {
             ("stiffness", self.stiffness),
         ] {
             if !(SMALLEST..=LARGEST).contains(&value) {
-                return Err(InvalidParameter(format!(
+                return Err(Error::new(format!(
                     "{name} must be between {SMALLEST:e} and {LARGEST:e}, it is {value}"
                 )));
             }
@@ -75,34 +75,20 @@ impl Parameters {
             [("Kp", self.Kp), ("Ki", self.Ki), ("Kd", self.Kd), ("max_correction", self.max_correction)]
         {
             if !(0.0..=LARGEST).contains(&value) {
-                return Err(InvalidParameter(format!(
-                    "{name} must be between 0 and {LARGEST:e}, it is {value}"
-                )));
+                return Err(Error::new(format!("{name} must be between 0 and {LARGEST:e}, it is {value}")));
             }
         }
         if self.Ki * self.sample_time > 1.0 {
-            return Err(InvalidParameter(format!(
+            return Err(Error::new(format!(
                 "Ki * sample_time must not exceed 1, or the integral oscillates from sample to sample; it is {}",
                 self.Ki * self.sample_time
             )));
         }
         for (name, value) in [("M", self.M), ("N", self.N)] {
             if value < 1 {
-                return Err(InvalidParameter(format!("{name} must be >= 1, it is {value}")));
+                return Err(Error::new(format!("{name} must be >= 1, it is {value}")));
             }
         }
         Ok(())
     }
 }
-
-/// Reason for which a set of parameters is invalid.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InvalidParameter(String);
-
-impl fmt::Display for InvalidParameter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for InvalidParameter {}
