@@ -118,11 +118,11 @@ pub fn random_contents_break_nothing<F: Either, M: Exported>() {
     let (mut random, mut accepted) = (Random(11), 0);
     for _ in 0..DAMAGED {
         let mut bytes = original.clone();
-        for _ in 0..=random.bits() % 3 {
+        for _ in 0..=random.below(3) {
             // Writes a number of any magnitude at any offset, so that it may overlap two values.
-            let at = MODE.end + random.bits() as usize % (bytes.len() - MODE.end - 16);
-            let word = random.bits() >> (random.bits() % 64);
-            let width = if random.between(0.0, 1.0) < 0.5 { 4 } else { 8 };
+            let at = MODE.end + random.below(bytes.len() - MODE.end - 16);
+            let word = random.bits() >> random.below(64);
+            let width = if random.chance(0.5) { 4 } else { 8 };
             bytes[at..at + width].copy_from_slice(&word.to_le_bytes()[..width]);
         }
         let (bytes, mut state) = (sealed(bytes), null_mut());

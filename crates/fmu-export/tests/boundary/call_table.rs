@@ -347,9 +347,9 @@ fn walk<F: Either, M: Exported>(interface: Interface) {
     let (mut random, mut mode) = (Random(13), Instantiated);
     let mut visits = std::collections::BTreeMap::new();
     for _ in 0..20_000 {
-        let function = F::functions()[random.bits() as usize % F::functions().len()];
+        let function = F::functions()[random.below(F::functions().len())];
         // Few calls reset the instance or end its simulation, because most other calls need an initialized instance.
-        if matches!(&function[4..], "Reset" | "Terminate") && random.bits() % 8 > 0 {
+        if matches!(&function[4..], "Reset" | "Terminate") && random.below(8) > 0 {
             continue;
         }
         let status = ValidCall::new::<F, M>(&fmu, function, mode).make(&fmu, |_| ());

@@ -103,8 +103,7 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
 
 /// Returns pseudorandom bytes that are the same in every run.
 pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
-    // The multiplier of splitmix64 turns consecutive seeds into distant states.
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut random = Random::mixed(seed);
     (0..count.div_ceil(8)).flat_map(|_| random.bits().to_le_bytes()).take(count).collect()
 }
 
