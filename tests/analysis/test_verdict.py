@@ -54,6 +54,12 @@ FAULTY_COLUMNS = {
         "tau2",
         "fading of tau2 of ",
     ),
+    # 5 standard errors, a little more than are a misfit.
+    "hardly any fading": (
+        lambda c: {"tau2": c["tau2"] * (1 - 0.0008 * c["time"] / c["time"][-1])},
+        "tau2",
+        "fading of tau2 of ",
+    ),
     "crosstalk": (
         lambda c: {"tau1": c["tau1"] + 0.01 * c["tau2"], "tau2": c["tau2"] + 0.01 * c["tau1"]},
         "tau1",
@@ -127,7 +133,9 @@ def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     assert any(reported in cause for cause in found.diagnosis), found.diagnosis
 
 
-@pytest.mark.parametrize("fault", quickly(FAULTY_COLUMNS, "clipped", "degrees", "sign", "swapped", "stuck"))
+@pytest.mark.parametrize(
+    "fault", quickly(FAULTY_COLUMNS, "clipped", "degrees", "sign", "swapped", "stuck", "hardly any fading")
+)
 def test_a_faulty_column_is_named(experiment, fmu, fault):
     change, channel, reported = FAULTY_COLUMNS[fault]
     columns = recording(experiment)

@@ -38,7 +38,8 @@ AT_REST = 1e-3
 TRIED = 2
 #: A hypothesis is tried if its expected gain in likelihood exceeds this share of the largest expected gain.
 WORTH_TRYING = 0.05
-#: Gain in likelihood for each unknown below which a hypothesis counts as chance.
+#: Gain in likelihood for each unknown below which a hypothesis counts as chance. A hypothesis that explains the data may gain COST less than
+#: others, because a fault of more than CLEAR standard errors is a misfit: otherwise, it would have no cause.
 COST = 12.0
 #: A fit with a hypothesis that does not explain the data is refined at most this number of times.
 REFINED = 2
@@ -143,9 +144,10 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
         tried.update(dict.fromkeys(map(str, fitted)))
         others.update(dict.fromkeys(map(str, left_out)))
         first = chosen[0].gain if chosen else 0.0
-        if not trials or trials[0].gain < max(CLEAR**2, SECOND * first):
+        likely = [t for t in trials if t.gain > max(CLEAR**2 - COST * t.verdict.fits, SECOND * first)]
+        if not likely:
             break
-        best = trials[0]
+        best, rest = likely[0], [t for t in trials if t is not likely[0]]
         for _ in range(REFINED):
             # Far from the solution, the patterns of large effects need more rounds.
             if best.verdict.fits:
@@ -155,7 +157,7 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
             if before - refined.deviance < COST:
                 break
         chosen.append(best)
-        rivals = [t for t in trials[1:] if t.verdict.fits and t.gain > best.gain - ALIKE_GAIN]
+        rivals = [t for t in rest if t.verdict.fits and t.gain > best.gain - ALIKE_GAIN]
         # A delay of more channels is not another cause.
         rivals = [
             t
@@ -164,7 +166,7 @@ def explain(solution: Solution, verdict: Verdict) -> Explanation:
         ]
         # A gain of all torques and wrong inertias have nearly the same effect.
         if best.hypothesis == INERTIAS or _all_torques(best.hypothesis, solution):
-            rivals += [t for t in trials[1:] if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, solution)]
+            rivals += [t for t in rest if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, solution)]
         rivals = list({t.hypothesis: t for t in rivals}.values())
         # If the first cause explains no channel, further ones would be guesses.
         if best.verdict.fits or len(best.verdict.misfits) >= len(verdict.misfits) > 1:
@@ -284,7 +286,7 @@ def _trials(solution: Solution, verdict: Verdict) -> tuple[list[_Trial], list[Hy
             unknowns = max(len(hypothesis.distortions), 3 if not hypothesis.distortions else 1)
             gain = solution.deviance - found.deviance - COST * unknowns
             if not hypothesis.positive or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
-                trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 else verdict))
+                trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 - COST else verdict))
     return sorted(trials, key=lambda trial: -trial.gain), chosen, left_out
 
 
