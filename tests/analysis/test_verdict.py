@@ -11,7 +11,7 @@ import rig
 from monte_carlo import with_fault
 
 import prw
-from prw.identification.diagnosis import INERTIAS, sums_of_inertias
+from prw.identification.diagnosis import INERTIAS, _flat, sums_of_inertias
 from prw.identification.kinds import KINDS
 from prw.identification.verdict import hypotheses
 
@@ -144,6 +144,15 @@ def test_a_faulty_column_is_named(experiment, fmu, fault):
     assert reported in found.diagnosis[0], found.diagnosis
     if "is cut off" in reported:
         assert "is cut off at -3" in found.diagnosis[1], "both ends are named"
+
+
+def test_a_shaft_that_rests_while_the_other_one_moves_is_not_stuck():
+    time = np.arange(3000) / 1000
+    angle = 0.3 * np.where(time < 1, time, np.where(time < 1.6, 1.0, time - 0.6))
+    column, moving = 1e-4 * np.round(angle / 1e-4), np.ones(len(time), dtype=bool)
+    assert not list(_flat("theta3", time, column, moving, angle, hidden=5e-4))
+    (message,) = _flat("theta3", time, column, moving, 0.3 * time, hidden=5e-4)
+    assert message.startswith("theta3 is stuck from 1 to 1.6")
 
 
 @pytest.mark.long

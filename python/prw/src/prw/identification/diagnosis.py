@@ -16,6 +16,7 @@ from prw.identification.experiment import Experiment, prepare
 from prw.identification.fit import FINE, Fitter, Prior, Solution, Task, fit, refitted
 from prw.identification.kinds import KINDS
 from prw.identification.model import Model
+from prw.identification.path import quantum_of, rough_noise
 from prw.identification.response import Distortion
 from prw.identification.rounding import rounded
 from prw.identification.statistics import certainty, covariance_of, information_of
@@ -30,8 +31,9 @@ TOLERANCE = 1.7
 #: Correlation above which two signals are alike, and below which they are unlike.
 ALIKE, UNLIKE = 0.9, 0.7
 #: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range. A channel that is constant
-#: for longer than STUCK, s, mostly while the motors move, is stuck.
-FLAT, FLATS, STUCK = 4, 3, 0.25
+#: for longer than STUCK, s, mostly while the motors move, is stuck if the model moves it by more than HIDDEN steps of its encoder, and by
+#: more than this multiple of its noise.
+FLAT, FLATS, STUCK, HIDDEN = 4, 3, 0.25, 5.0
 #: The motors are at rest while the rate of the faster one is at most this share of its maximum.
 AT_REST = 1e-3
 #: Number of hypotheses of each kind with which the fit is repeated.
@@ -466,7 +468,11 @@ def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Itera
                 yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times the FMU's value"
                 break
         speed = np.interp(experiment.sampled, experiment.time, np.abs(experiment.omega).max(axis=1))
-        yield from _flat(name, experiment.sampled, column, speed > AT_REST * speed.max())
+        known = column[np.isfinite(column)]
+        hidden = HIDDEN * max(quantum_of(known), rough_noise(known))
+        yield from _flat(
+            name, experiment.sampled, column, speed > AT_REST * speed.max(), solution.modelled[i][:, j], hidden
+        )
 
 
 def _turned(fitter: Fitter, point: Array, experiment: Experiment, likes: Array) -> str:
@@ -488,10 +494,13 @@ def _slip(gain: float) -> float:
     return next((s for s in SLIPS if gain > 0 and abs(np.log(gain / s)) < np.log(TOLERANCE)), 0.0)
 
 
-def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> Iterator[str]:
-    """Messages if a channel saturates, or is constant while the motors move. time, column, moving: (n,)."""
+def _flat(
+    name: str, time: Array, column: Array, moving: NDArray[np.bool_], modelled: Array, hidden: float
+) -> Iterator[str]:
+    """Messages if a channel saturates, or is constant while the motors move. time, column, moving, modelled: (n,). hidden: motion of the
+    modelled channel that the measured one need not show, for example because the shaft of one motor rests while the other moves."""
     there = np.isfinite(column)
-    time, column, moving = time[there], column[there], moving[there]
+    time, column, moving, modelled = time[there], column[there], moving[there], modelled[there]
     edges = np.flatnonzero(np.diff(column) != 0)
     first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(column) - 1]])
     long = last - first + 1
@@ -508,5 +517,7 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     if saturated:
         return
     longest = int(np.argmax(long))
-    if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
+    span = slice(first[longest], last[longest] + 1)
+    follows = moving[span].mean() > 0.5 and np.ptp(modelled[span]) > hidden
+    if follows and time[last[longest]] - time[first[longest]] > STUCK:
         yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"
