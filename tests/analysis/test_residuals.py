@@ -29,7 +29,9 @@ def recorded(rate, seed, jitter=0.0):
         if quantum:
             values[:, i] = np.round(values[:, i] / quantum + random.uniform()) * quantum
     power = np.array([[quantum**2 / 12 for quantum, _ in CHANNELS.values()]])
-    experiment = SimpleNamespace(channels=tuple(CHANNELS), sampled=time, values=values, channel_power=power)
+    experiment = SimpleNamespace(
+        channels=tuple(CHANNELS), sampled=time, values=values, channel_power=power, limited=False
+    )
     return experiment, angles(time)
 
 

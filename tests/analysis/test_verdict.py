@@ -282,6 +282,38 @@ def test_hum_is_estimated_on_request(experiment, fmu, frequency, given, subtract
     assert [note for note in found.notes if "hum" in note] == subtracted
 
 
+@pytest.mark.parametrize("given", [50.0, 16.7])
+def test_hum_that_is_not_there_changes_nothing(experiment, fmu, given):
+    columns = recording(experiment)
+    found, without = (prw.identify(columns, hum=hum, starts=1, fmu=fmu) for hum in ({"tau1": given}, {}))
+    assert [note for note in found.notes if note not in without.notes] == [
+        f"recording: no hum of tau1 is found {'near 50 Hz, so nothing is subtracted' if given == 50 else 'at 16.7 Hz, so none is estimated'}"
+    ]
+    assert found.values == without.values
+
+
+def spoiled(columns: dict[str, np.ndarray], share: float) -> dict[str, np.ndarray]:
+    """The columns, in which a share of the values of a torque, an encoder and an inertial sensor is replaced by a value far off."""
+    random, rows = np.random.default_rng(3), len(columns["time"])
+    off = {"tau1": 5.0, "theta4": 0.0, "roll": -0.4}
+    return {**columns, **{n: np.where(random.random(rows) < share, x, columns[n]) for n, x in off.items()}}
+
+
+@pytest.mark.parametrize("share", [pytest.param(0.001, marks=pytest.mark.long), 0.01])
+def test_outliers_count_less_on_request(experiment, fmu, share):
+    columns = recording(experiment)
+    plain, found = (prw.identify(spoiled(columns, share), robust=robust, starts=1, fmu=fmu) for robust in (False, True))
+    assert not plain.fits and any("let them count less (robust)" in note for note in plain.notes), plain.notes
+    assert_contains(found, experiment)
+    assert not any("spikes" in note for note in found.notes), found.notes
+    counted = [note for note in found.notes if "standard deviations from the model" in note]
+    assert [note.split(" of ")[1].split()[0] for note in counted] == ["tau1", "theta4", "roll"], counted
+    # Without outliers, the loss costs hardly anything.
+    clean = prw.identify(columns, starts=1, fmu=fmu)
+    for name, estimate in found.parameters.items():
+        assert estimate.relative < 1.3 * clean.parameters[name].relative, name
+
+
 def test_hum_of_a_channel_that_was_not_measured(experiment, fmu):
     with pytest.raises(prw.UserError, match="hum: tau9 is not known"):
         prw.identify(recording(experiment), hum={"tau9": 50}, fmu=fmu)

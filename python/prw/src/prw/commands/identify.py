@@ -106,6 +106,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="channel with hum, as in tau1=50, which is subtracted. May be repeated",
     )
     parser.add_argument(
+        "--robust",
+        action="store_true",
+        help="values that are more than 4 standard deviations from the model, such as spikes, count less",
+    )
+    parser.add_argument(
         "--follow",
         type=int,
         nargs="?",

@@ -10,6 +10,7 @@ The modules in the order of dependence; `identify` below combines them::
     verdict, diagnosis   whether the model explains the data, and possible causes if not
     design, excitation   more informative experiments; `prw.excite`
     rounding             digits of numbers
+    outliers             the robust fit, in which values far from the model count less
     residuals            hum, spikes and jitter in the residuals
     findings, results    the return value, as attributes, text and files
     report               the HTML page
@@ -20,6 +21,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, not_negative, positive, spread_of
@@ -27,8 +29,8 @@ from prw.errors import UserError, need
 
 if TYPE_CHECKING:
     from prw.arguments import Given
-    from prw.identification.experiment import Rates
-    from prw.identification.fit import Task
+    from prw.identification.experiment import Experiment, Rates
+    from prw.identification.fit import Solution, Task
     from prw.identification.model import Parameters
     from prw.identification.response import Distortion
     from prw.identification.results import Identification
@@ -73,6 +75,7 @@ def identify(
     crosstalk: Sequence[str] = (),
     drift: Sequence[str] = (),
     hum: Mapping[str, float] = {},
+    robust: bool = False,
     follow: int = 0,
     names: Mapping[str, str] = {},
     skip: int = 0,
@@ -134,6 +137,9 @@ def identify(
     hum
         Frequency in Hz by channel that contains hum of the mains, such as {"tau1": 50}. Its frequency may differ by up to 0.5 Hz, but must
         be exact if the motors move the channel at this frequency, too; the hum is then estimated with the parameters.
+    robust
+        Whether values that are more than 4 standard deviations from the model count less, as spikes of a sensor: beyond this limit, the
+        loss grows linearly instead of quadratically. The motors' angles have no such limit.
     follow
         Maximum number of steps in which the first cause of a misfit is assumed and the fit is repeated. A step is not taken if
         several causes explain the data, or if the cause needs a correction of the recording. See `assumed` and `stopped`.
@@ -154,15 +160,17 @@ def identify(
     """
     need("scipy", "threadpoolctl")
     # These imports are slow.
+    import numpy as np
     from threadpoolctl import threadpool_limits
 
     from prw.arguments import values_of
     from prw.identification.design import advice
     from prw.identification.diagnosis import Explanation, explain, over_time
     from prw.identification.experiment import may_be_simulated, prepare
-    from prw.identification.fit import fit
+    from prw.identification.fit import fit, no_hum
     from prw.identification.kinds import KINDS
     from prw.identification.model import Model
+    from prw.identification.outliers import fit_robustly
     from prw.identification.response import Distortion
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
@@ -222,8 +230,23 @@ def identify(
         exact = [may_be_simulated(experiment) for experiment in experiments]
         ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
         assumed: list[str] = []
+
+        def fitted(task: Task) -> tuple[list[Experiment], Solution]:
+            return (
+                fit_robustly(model, experiments, task, starts, seed)
+                if robust
+                else (experiments, fit(model, experiments, task, starts, seed))
+            )
+
         while True:
-            solution = fit(model, experiments, task, starts, seed)
+            used, solution = fitted(task)
+            if absent := no_hum(solution):
+                task = replace(task, hum={name: at for name, at in task.hum.items() if name not in absent})
+                experiments = [
+                    replace(e, notes=(*e.notes, *(note for name, note in absent.items() if name in e.channels)))
+                    for e in experiments
+                ]
+                used, solution = fitted(task)
             verdict = judge(solution)
             for way in ways:
                 if not verdict.fits:
@@ -232,8 +255,15 @@ def identify(
                     ]
                     other = fit(model, again, task, starts, seed)
                     if (better := judge(other)).fits:
-                        experiments, solution, verdict = again, other, better
+                        experiments = used = again
+                        solution, verdict = other, better
             found = Explanation(solution, verdict, (), ()) if verdict.fits else explain(solution, verdict)
+            if robust and found.verdict.fits and found.causes:
+                # What was added explains some of the values that the model alone did not.
+                used, solution = fitted(found.solution.task)
+                verdict = judge(solution)
+                wider = np.maximum(verdict.widening, found.verdict.widening)
+                found = found._replace(solution=solution, verdict=verdict._replace(widening=wider))
             stopped = "" if found.verdict.fits or not follow else found.unclear
             if found.verdict.fits or stopped or len(assumed) == follow:
                 break
@@ -243,10 +273,10 @@ def identify(
             stopped = f"the limit of {follow} is reached"
         parts = [] if found.verdict.fits or found.known else over_time(model, measured, task, how)
         sure = certainty(found.solution, found.verdict.widening)
-        hints = advice(model, experiments, found.solution) if sure.undetermined else []
+        hints = advice(model, used, found.solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)
         judged = found, tuple(parts), tuple(hints), tuple(assumed), stopped
-        return Identification(model.fmu, model.known, sources, tuple(experiments), found.solution, sure, *judged)
+        return Identification(model.fmu, model.known, sources, tuple(used), found.solution, sure, *judged)
 
 
 def task_of(

@@ -46,8 +46,11 @@ EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 DRAWS, FURTHEST = 64, 100
 #: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
-#: Largest difference of the frequency of hum from its nominal value, Hz.
-SEARCHED = 0.5
+#: Largest difference of the frequency of hum from its nominal value, Hz; range around it, Hz, with whose power the hum is compared; and
+#: least ratio of both, which white noise exceeds in one of 10 000 recordings.
+SEARCHED, AROUND, HUM = 0.5, 8.0, 15.0
+#: Largest number of frequencies on each side whose power is compared.
+NEARBY = 50
 #: Minimum numbers of compared frequencies, and of values from which a channel's noise is estimated.
 MIN_FREQUENCIES, MIN_VALUES = 8, 20
 
@@ -87,6 +90,8 @@ class Experiment:
     jumps
         (n, 2) rad, if the FMU simulated the recording, else None: the difference of each angle from its extrapolation
         with the rate, which makes the FMU's states jump at the start of the next step.
+    limited
+        Whether values far from the model were limited, see `outliers`.
     """
 
     name: str
@@ -104,6 +109,7 @@ class Experiment:
     paths: tuple[Path, Path] | None = None
     notes: tuple[str, ...] = ()
     jumps: Array | None = None
+    limited: bool = False
 
     @property
     def step(self) -> float:
@@ -229,14 +235,11 @@ def prepare(
     for name, frequency in hum.items():
         if name in channels and frequency - SEARCHED > (bins - 1) / (len(time) * spacing):
             i = channels.index(name)
-            values[:, i], note = _without_hum(sampled, values[:, i], name, frequency)
+            values[:, i], note = _without_hum(
+                sampled, values[:, i], name, frequency, (bins - 1) / (len(time) * spacing)
+            )
             notes += (note,)
-    channel_errors = np.zeros((DRAWS, bins, len(channels)), dtype=np.complex128)
-    for i, column in enumerate(values.T):
-        there = np.isfinite(column)
-        if _stepped(column[there]):
-            channel = smooth(sampled[there], column[there])
-            channel_errors[:, :, i] = spectra(_drawn(channel, inside, sampled[there]).T)[:bins].T
+    channel_errors = np.stack([errors_of_steps(sampled, column, inside, bins) for column in values.T], axis=2)
     between = None if even else _interpolation(time, sampled)
     motor_errors = np.stack([_with_rates(e, p.rate_noise, spacing)[:, :bins] for e, p in zip(errors, paths)], axis=2)
     return Experiment(
@@ -250,9 +253,10 @@ def prepare(
     )
 
 
-def _without_hum(time: Array, column: Array, name: str, frequency: float) -> tuple[Array, str]:
+def _without_hum(time: Array, column: Array, name: str, frequency: float, band: float) -> tuple[Array, str]:
     """A channel (n,) without the hum at a frequency near `frequency`, Hz, and a note. The mains are not exact, so the hum is where the channel
-    has the most power within SEARCHED. The window suppresses the motion, which has other frequencies."""
+    has the most power within SEARCHED. The window suppresses the motion, which has other frequencies. Without hum, nothing changes. band: highest
+    frequency of the motion, Hz."""
     there = np.isfinite(column)
     known, values = time[there], column[there]
     window = np.hanning(len(values))
@@ -270,8 +274,25 @@ def _without_hum(time: Array, column: Array, name: str, frequency: float) -> tup
         minimize_scalar(lambda at: -abs(amplitude(at)), bounds=span, method="bounded", options={"xatol": 1e-6}).x
     )
     size = amplitude(exact)
+    away = np.arange(2 * SEARCHED, AROUND, max(4 * spacing, AROUND / NEARBY))
+    around = [at for by in away for at in (frequency - by, frequency + by) if at > band]
+    near = [abs(amplitude(at)) ** 2 for at in around]
+    # The median of the power of noise, which has an exponential distribution, is not changed by other lines.
+    if abs(size) ** 2 < HUM * float(np.median(near)) / np.log(2):
+        return column, f"no hum of {name} is found near {frequency:g} Hz, so nothing is subtracted"
     note = f"hum of {name} of {exact:.5g} Hz with an amplitude of {abs(size):.2g} {si_unit(name)} is subtracted"
     return column - (size * np.exp(2j * np.pi * exact * time)).real, note
+
+
+def errors_of_steps(sampled: Array, column: Array, time: Array, bins: int) -> Complex:
+    """Spectra (DRAWS, bins) at `time` (n,) of the errors that the steps of an encoder cause in a channel (s,) at the times `sampled`; 0 if it
+    has none, or more of other noise."""
+    there = np.isfinite(column)
+    if not _stepped(column[there]):
+        return np.zeros((DRAWS, bins), dtype=np.complex128)
+    drawn = _drawn(smooth(sampled[there], column[there]), time, sampled[there])
+    found: Complex = spectra(drawn.T)[:bins].T
+    return found
 
 
 def may_be_simulated(experiment: Experiment) -> bool:

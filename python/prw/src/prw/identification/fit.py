@@ -41,6 +41,8 @@ ROUNDS, FEW_ROUNDS, SETTLED = 12, 4, 0.003
 NOISE_ROUNDS = 30
 #: The patterns of effects are repeated until the unknowns change by less than this.
 FOLLOWED = 2e-4
+#: Amplitude of hum, in standard errors, which noise exceeds in one of 10 000 recordings.
+HUM = 4.3
 #: Highest degree of the polynomials that describe the drift of a channel.
 DRIFT = 5
 #: Least distance of the start of a search from the bounds.
@@ -182,6 +184,19 @@ def humming(experiment: Experiment, hum: Mapping[str, float]) -> dict[int, Array
     return found
 
 
+def no_hum(solution: Solution) -> dict[str, str]:
+    """The channels without hum among those whose hum the fit estimates, each with a note."""
+    found: dict[str, list[bool]] = {}
+    for comparison in solution.comparisons:
+        for name, significant in comparison.hum.items():
+            found.setdefault(name, []).append(significant)
+    return {
+        name: f"no hum of {name} is found at {solution.task.hum[name]:g} Hz, so none is estimated"
+        for name, each in found.items()
+        if not any(each)
+    }
+
+
 class Comparison:
     """An experiment compared with the model, for one set of parameters and given noise.
 
@@ -196,6 +211,8 @@ class Comparison:
         (6,), difference x[0] - x[n] of the states at the start and at the end.
     drift
         (n, c), drift of the channels, SI, and their hum.
+    hum
+        Whether the estimated hum of each channel is more than noise, by the channel's name.
     """
 
     def __init__(
@@ -242,11 +259,14 @@ class Comparison:
         self.residual = self.project(white[..., -1])
         paths = polynomials(len(experiment.time))
         first, drifting = steady.shape[2], [i for i, name in enumerate(experiment.channels) if name in task.drift]
-        self.drift = np.zeros((len(experiment.time), channels))
+        self.drift, self.hum = np.zeros((len(experiment.time), channels)), dict[str, bool]()
         self.drift[:, drifting] = paths @ found[first : first + DRIFT * len(drifting)].reshape(-1, DRIFT).T
         first += DRIFT * len(drifting)
         for k, (i, wave) in enumerate(waves.items()):
-            self.drift[:, i] += wave @ found[first + 2 * k : first + 2 * k + 2]
+            both = slice(first + 2 * k, first + 2 * k + 2)
+            self.drift[:, i] += wave @ found[both]
+            errors = np.linalg.norm(right[determined].T[both] / sizes[determined], axis=1)
+            self.hum[experiment.channels[i]] = bool(np.linalg.norm(found[both] / errors) > HUM)
         self.offsets, self.initial = found[:channels] if task.offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
 

@@ -38,14 +38,14 @@ def notes_on_residuals(experiment: Experiment, modelled: Array) -> list[str]:
         time, values = experiment.sampled[keep], column[keep]
         # A jitter looks like spikes where a channel moves fast.
         size = np.zeros(len(values))
-        if not unsteady:
+        if not unsteady and not experiment.limited:
             size = _spikes(values, modelled[keep, i], time, quantum_of(experiment.values[keep, i]))
         spikes = size > 0
         if spikes.any():
             worst = int(size.argmax())
             notes.append(
                 f"{name} has spikes in {spikes.sum()} rows, the largest of {size[worst]:.2g} {si_unit(name)} at {time[worst]:.6g} s; "
-                "empty these cells, which are then skipped"
+                "let them count less (robust), or empty these cells"
             )
             values = np.where(spikes, 0.0, values)
         notes += [f"{name} contains {hum}" for hum in [_hum(time, values, si_unit(name))] if hum]
