@@ -29,12 +29,15 @@ from prw.state_space import Complex, StateSpace
 
 #: Share of a rate's greatest magnitude in which the sign of the rate changes smoothly, as the hyperbolic tangent.
 TURNING = 0.02
-#: Share of a spring's torque up to which the cubic part grows; without this limit, wrong data could make the motion unstable.
-LARGEST = 0.5
+#: Shares of a spring's torque up to which the cubic part grows, if it is positive and if it is negative; without these limits, wrong data
+#: could make the motion unstable.
+LARGEST, LARGEST_NEGATIVE = 2.0, 0.5
 #: Clearance in rad at which the pattern of a clearance is calculated that the motion does not contain.
 SMALL = 1e-4
 #: Time in s after which the states have forgotten how they began.
 SETTLED = 1.0
+#: Rounds in which a smooth effect and the state at the end of a step are adjusted to each other.
+CORRECTED = 2
 #: Rounds in which the frictions of two shafts are adjusted to each other within a step.
 ADJUSTED = 3
 
@@ -55,6 +58,10 @@ class Law(NamedTuple):
         Effect (..., m) per unit of its size, from the signals (..., q) and the size. None for dry friction.
     once
         The same for the signals [q] of one instant, as a list [m], because numpy is slow for single numbers.
+    during
+        Mean of the effect during a step, from the signals at its beginning and at its end; default: the mean of `once` at both.
+    smooth
+        Whether the effect has no kinks, so that its mean during a step follows from more than the two ends of the step.
     fixed
         The part (..., m) of the effect that does not depend on its size, from the same arguments; None if there is none.
     reacts
@@ -67,7 +74,9 @@ class Law(NamedTuple):
     follows: tuple[Array, Array]
     of: Callable[[Array, float], Array] | None = None
     once: Callable[[list[float], float], list[float]] | None = None
+    during: Callable[[list[float], list[float], float], list[float]] | None = None
     fixed: Callable[[Array, float], Array] | None = None
+    smooth: bool = False
     reacts: Array | None = None
 
     def signals(self, states: Array, motors: Array) -> Array:
@@ -114,16 +123,16 @@ def law(distortion: Distortion, model: StateSpace, values: Mapping[str, float]) 
     if kind == "softening":
         with_time = np.zeros((3, 5))
         with_time[:2, :4], with_time[2, 4] = twist[1], 1.0
-        return Law(drive, direct, (np.vstack([twist[0], np.zeros(6)]), with_time), _softer, _softer_once)
+        return Law(drive, direct, (np.vstack([twist[0], np.zeros(6)]), with_time), _softer, _softer_once, smooth=True)
     if kind == "cubic":
-        return Law(drive, direct, twist, _cubed, _cubed_once)
+        return Law(drive, direct, twist, _cubed, _cubed_once, smooth=True)
     if kind == "backlash":
         return Law(drive, direct, twist, _free, _free_once)
     other = {"k1": "c2", "k2": "c1"}[place]
     reaction = (values["c1"] + values["c2"]) / values[other]
     opening = [reaction * (e + values[f"c{place[1]}"] / values[place] * de) for e, de in zip(twist, rate)]
     follows = np.vstack([twist[0], opening[0]]), np.vstack([twist[1], opening[1]])
-    return Law(drive, direct, follows, _let_go, _let_go_once, _open)
+    return Law(drive, direct, follows, _let_go, _let_go_once, _struck, _open)
 
 
 def including(model: StateSpace, values: Mapping[str, float], sizes: Mapping[Distortion, float]) -> StateSpace:
@@ -186,6 +195,23 @@ def _let_go_once(signals: list[float], size: float) -> list[float]:
     ]
 
 
+def _struck(before: list[float], after: list[float], size: float) -> list[float]:
+    """Mean shift during a step. If the parts of a coupling strike each other, the shift jumps, so the time before and the time after count
+    according to their shares of the step."""
+    m, half, found = len(before) // 2, size / 2, []
+    for x, y, e0, e1, f0, f1 in zip(
+        _let_go_once(before, size), _let_go_once(after, size), before[:m], after[:m], before[m:], after[m:]
+    ):
+        shut = 0.5 if e1 > 0 else -0.5
+        if abs(e0) <= half < abs(e1) and y == -shut:
+            # Parts that cross the whole clearance within a step touch only the side that they reach.
+            share = (half * 2 * shut - e0) / (e1 - e0)
+            found.append(share * (-f0 - share * (f1 - f0) / 2) / size - (1 - share) * shut)
+        else:
+            found.append((x + y) / 2)
+    return found
+
+
 def _open(signals: Array, size: float) -> Array:
     """The shift of `_let_go` where the coupling is open, else 0."""
     shift = size * _let_go(signals, size)
@@ -195,14 +221,19 @@ def _open(signals: Array, size: float) -> Array:
 
 def _cubed(twist: Array, size: float) -> Array:
     """Shift of a spring's end for a torque k (twist + size twist^3)."""
-    reach = np.sqrt(LARGEST / abs(size)) if size else np.inf
+    reach = _reach(size) if size else np.inf
     found: Array = np.clip(twist, -reach, reach) ** 3
     return found
 
 
 def _cubed_once(twist: list[float], size: float) -> list[float]:
-    reach = (LARGEST / abs(size)) ** 0.5
+    reach = _reach(size)
     return [min(max(e, -reach), reach) ** 3 for e in twist]
+
+
+def _reach(size: float) -> float:
+    """Twist up to which the cubic part of a torque grows."""
+    return float(((LARGEST if size > 0 else LARGEST_NEGATIVE) / abs(size)) ** 0.5)
 
 
 def sign(signal: Array) -> Array:
@@ -242,7 +273,7 @@ def columns(
         signals = laws[d].signals(moved, motors)
         of, fixed, size = laws[d].of, laws[d].fixed, sizes.get(d, 0.0)
         at = -sign(signals) if of is None else of(signals, size)
-        during = strengths[d] if d in strengths else _mean(at)
+        during = _mean_of_cubic(at) if laws[d].smooth else strengths[d] if d in strengths else _mean(at)
         _, gain = _held(model.A * experiment.step, laws[d].drive * experiment.step)
 
         def driven(during: Array, at: Array, gain: Array = gain, direct: Array = laws[d].direct[rows]) -> Complex:
@@ -264,6 +295,13 @@ def _motors(experiment: Experiment) -> Array:
 def _mean(values: Array) -> Array:
     """Mean of the values (n, m) at the beginning and the end of each step."""
     return (values + np.roll(values, -1, axis=0)) / 2
+
+
+def _mean_of_cubic(values: Array) -> Array:
+    """Mean (n, m) of the cubic through the values (n, m) around each step."""
+    last, next_, after = (np.roll(values, k, axis=0) for k in (1, -1, -2))
+    found: Array = (13 * (values + next_) - last - after) / 24
+    return found
 
 
 def _of_sensors(
@@ -335,35 +373,45 @@ def _moved(
         gain = towards @ (size * _held(A, laws[d].drive * experiment.step)[1])
         signals = laws[d].signals(states, motors)
         part = slice(*ends[-2:])
-        steps.append(
-            (size, gain, gain[part], part, laws[d].once, signals.tolist(), np.zeros((len(states), gain.shape[1])))
-        )
+        steps.append((size, gain, gain[part], part, laws[d], signals.tolist(), np.zeros((len(states), gain.shape[1]))))
     # The shift of the states and of all signals at the end of a step, from the shift of the states at its beginning.
     advance, shifts = towards @ stepped, np.zeros_like(states)
 
     def follow(first: int, shift: Array) -> Array:
         """Follows the effects from row `first`, where they have shifted the states by `shift`, to the end. Returns the last shift."""
-        ahead = towards @ shift
+        ahead, last = towards @ shift, dict[int, list[float]]()
         shifts[first] = shift
         for k in range(first, len(states) - 1):
             now, ahead = ahead.tolist(), advance @ ahead[:6]
-            for size, gain, own, part, once, signals, found in steps:
+            for i, (size, gain, own, part, law, signals, found) in enumerate(steps):
                 before = [x + y for x, y in zip(signals[k], now[part])]
                 expected = [x + y for x, y in zip(signals[k + 1], ahead[part].tolist())]
-                if once is None:
+                if law.once is None:
                     found[k] = _braked(before, expected, own)
                 else:
-                    # During the step, the effect is about as large as in the step before.
-                    expected = [x + y for x, y in zip(expected, (own @ found[k - 1]).tolist())]
-                    found[k] = [(x + y) / 2 for x, y in zip(once(before, size), once(expected, size))]
+                    # During the step, the effect is about as large as in the step before, or it continues to change as before.
+                    guess = 2 * found[k - 1] - found[k - 2] if law.smooth and k > first + 1 else found[k - 1]
+                    linear, expected = expected, [x + y for x, y in zip(expected, (own @ guess).tolist())]
+                    if law.during is not None:
+                        found[k] = law.during(before, expected, size)
+                    elif law.smooth:
+                        # Adams and Moulton: the mean of the parabola through the last three instants.
+                        at = law.once(before, size)
+                        for _ in range(CORRECTED):
+                            then = law.once(expected, size)
+                            found[k] = [(5 * z + 8 * y - x) / 12 for x, y, z in zip(last.get(i, at), at, then)]
+                            expected = [x + y for x, y in zip(linear, (own @ found[k]).tolist())]
+                        last[i] = at
+                    else:
+                        found[k] = [(x + y) / 2 for x, y in zip(law.once(before, size), law.once(expected, size))]
                 ahead = ahead + gain @ found[k]
             shifts[k + 1] = ahead[:6]
-        last: Array = shifts[-1]
-        return last
+        end: Array = shifts[-1]
+        return end
 
     # The spectra count the recording as periodic, so the first row follows the last one.
-    last = follow(max(len(states) - int(SETTLED / experiment.step) - 1, 0), np.zeros(6))
-    follow(0, stepped @ last)
+    end = follow(max(len(states) - int(SETTLED / experiment.step) - 1, 0), np.zeros(6))
+    follow(0, stepped @ end)
     moved: Array = states + shifts
     return moved, {d: found for d, (*_, found) in zip(sizes, steps)}
 
