@@ -26,8 +26,9 @@ from prw.state_space import Complex
 #: distributed: in slow motion, probabilities of 1e-8 occur in correct fits.
 CHANCE = 1e-10
 #: Ratios of the size of a fault to its standard error. Above CLEAR the fault is significant, above NOTED a note names it, and above
-#: SMALL it widens intervals. Friction always widens them, because every bearing has some.
+#: SMALL it widens intervals. EVERYWHERE always widens them, because every bearing has some friction, and no two couplings are equal.
 CLEAR, NOTED, SMALL = 4.7, 4.0, 2.5
+EVERYWHERE = ("friction", "asymmetry")
 #: CLEAR for faults that follow the sign of a rate. It is larger, because in a periodic motion the steps of encoders
 #: also follow that sign.
 CLEAR_SIGN = 7.0
@@ -247,7 +248,7 @@ def judge(solution: Solution) -> Verdict:
                 faults.append(fault)
     widening = np.zeros(len(inverse))
     for fault in faults:
-        if fault.hypothesis.kind == "friction" or fault.clear > SMALL:
+        if fault.hypothesis.kind in EVERYWHERE or fault.clear > SMALL:
             widening = np.maximum(widening, fault.bias)
     gain, count = common_gain(solution), len(solution.task.names)
     widening[:count] = np.hypot(widening[:count], abs(gain))
