@@ -84,6 +84,7 @@ REAL_RIGS = {
         0.03,
     ),
     "softer spring": ({"falling": 0.04}, "", 0.0),
+    "hardly unequal springs": ({"sides": (1.003, 1.0, 1.0, 1.0)}, "", 0.0),
     "undetectable friction": ({"friction": (0.001, 0.001)}, "", 0.0),
     "hardly any friction": ({"friction": (0.0005, 0.0005)}, "", 0.0),
     "nothing": ({}, "", 0.0),
@@ -93,7 +94,15 @@ REAL_RIGS = {
 
 
 #: The rigs of REAL_RIGS in the tests that `make test` runs.
-QUICK_RIGS = ("friction", "backlash of k2", "unequal springs", "undetectable friction", "softening")
+QUICK_RIGS = (
+    "friction",
+    "backlash of k2",
+    "unequal springs",
+    "undetectable friction",
+    "softening",
+    "softer spring",
+    "hardly unequal springs",
+)
 
 
 class RealRigs:
@@ -200,9 +209,12 @@ def test_friction_is_estimated_on_request(real_rigs, fmu):
     assert abs(value - 0.001) < 4.5 * error < 0.002
 
 
-@pytest.mark.long
-def test_a_decreasing_stiffness_is_estimated_on_request(real_rigs, fmu):
-    found = prw.identify(recording(real_rigs["softer spring"]), softening=["k2"], starts=1, fmu=fmu)
+def test_a_decreasing_stiffness_is_named_and_estimated_on_request(real_rigs, fmu):
+    columns = recording(real_rigs["softer spring"])
+    found = prw.identify(columns, starts=1, fmu=fmu)
+    assert not found.fits and not found.additions
+    assert any(cause.startswith("decrease of k2 over the recording of") for cause in found.diagnosis), found.diagnosis
+    found = prw.identify(columns, softening=["k2"], starts=1, fmu=fmu)
     assert_contains(found, real_rigs["softer spring"])
     value, error = found.distortions["decrease of k2 over the recording"]
     assert abs(value - 0.04) < 4.5 * error < 0.02
@@ -402,8 +414,11 @@ def test_faults_are_estimated_along(experiment, fmu, fault, option, channels, si
         assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
 
 
-@pytest.mark.parametrize("name", quickly(["nothing", "hardly any friction", "undetectable friction"], *QUICK_RIGS))
-def test_intervals_allow_for_friction_that_is_too_small_to_be_found(real_rigs, fmu, name):
+SMALL_EFFECTS = ("nothing", "hardly any friction", "undetectable friction", "hardly unequal springs")
+
+
+@pytest.mark.parametrize("name", quickly(SMALL_EFFECTS, *QUICK_RIGS))
+def test_intervals_allow_for_what_is_too_small_to_be_found(real_rigs, fmu, name):
     found = prw.identify(recording(real_rigs[name]), starts=1, fmu=fmu)
     assert found.fits and not found.additions, found.misfits
     for parameter, estimate in found.parameters.items():

@@ -271,7 +271,9 @@ def identify(
             task = found.causes[0].applied(task)
         if follow and not found.verdict.fits and not stopped:
             stopped = f"the limit of {follow} is reached"
-        parts = [] if found.verdict.fits or found.known else over_time(model, measured, task, how)
+        # The data of a jump may fit an even decrease, too.
+        steady = found.known and not any(cause.argument == "softening" for cause in found.causes)
+        parts = [] if found.verdict.fits or steady else over_time(model, measured, task, how)
         sure = certainty(found.solution, found.verdict.widening)
         hints = advice(model, used, found.solution) if sure.undetermined else []
         sources = tuple(str(each.source) for each in measured)

@@ -216,7 +216,7 @@ def judge(solution: Solution) -> Verdict:
     inverse = covariance_of(solution.task.prior_information() + information_of(solution.jacobians))
     misfits: list[Misfit] = []
     faults: list[Fault] = []
-    tried = [kind for kind in KINDS if kind not in (*FILTERS, "softening")]
+    tried = [kind for kind in KINDS if kind not in FILTERS]
     additions = [each for kind in tried for each in hypotheses(solution, kind)]
     effects = solution.fitter.effects(solution.logarithms, [d for each in additions for d in each.distortions])
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
