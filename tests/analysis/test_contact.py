@@ -110,8 +110,8 @@ def test_the_mean_of_the_shift_counts_both_sides_of_an_impact():
         opening = signals + fine[:, None] * 0.1 * (after - before)
         at = effects._let_go(np.hstack([signals, opening]), size)
         exact = at.mean(axis=0)
-        ends = [[*s.tolist(), *f.tolist()] for s, f in ((signals[0], opening[0]), (signals[-1], opening[-1]))]
-        np.testing.assert_allclose(effects._struck(*ends, size), exact, atol=2e-4)
+        first, last = ([*signals[k].tolist(), *opening[k].tolist()] for k in (0, -1))
+        np.testing.assert_allclose(effects._struck(first, last, size), exact, atol=2e-4)
         struck += int(np.abs(np.mean([at[0], at[-1]], axis=0) - exact).max() > 0.05)
     assert struck > 100, "the mean of both ends is not exact"
 

@@ -232,11 +232,9 @@ def identify(
         assumed: list[str] = []
 
         def fitted(task: Task) -> tuple[list[Experiment], Solution]:
-            return (
-                fit_robustly(model, experiments, task, starts, seed)
-                if robust
-                else (experiments, fit(model, experiments, task, starts, seed))
-            )
+            if robust:
+                return fit_robustly(model, experiments, task, starts, seed)
+            return experiments, fit(model, experiments, task, starts, seed)
 
         while True:
             used, solution = fitted(task)

@@ -34,15 +34,15 @@ DEVIATION = 1.4826
 def fit_robustly(
     model: Model, experiments: Sequence[Experiment], task: Task, starts: int, seed: int
 ) -> tuple[list[Experiment], Solution]:
-    """The fit with the robust loss: the experiments with limited values, and the solution. Other minima are sought in the first round."""
+    """The fit with the robust loss: the experiments with limited values, and the solution. Other minima are sought in the last round."""
     found = list(experiments)
-    solution = fit(model, found, task, starts, seed)
+    solution = fit(model, found, task, 1)
     for _ in range(ROUNDS):
         found = [limited(e, modelled) for e, modelled in zip(experiments, solution.modelled)]
         before, solution = solution, fit(model, found, task, 1)
         if np.abs(solution.logarithms - before.logarithms).max() < FOLLOWED:
             break
-    return found, replace(solution, tried=starts)
+    return found, fit(model, found, task, starts, seed) if starts > 1 else solution
 
 
 def limited(experiment: Experiment, modelled: Array) -> Experiment:
