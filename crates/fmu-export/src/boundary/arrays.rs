@@ -55,19 +55,15 @@ pub(crate) fn apart<T, U>(
     let [size, written] = [length.wrapping_mul(size_of::<T>()), count.wrapping_mul(size_of::<U>())];
     match other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
         true => Ok(()),
-        false => reject_overlap((length, size_of::<T>(), name), (count, size_of::<U>(), argument)),
+        false => reject_overlap((pointer, length, name), (values, count, argument)),
     }
 }
 
-/// Fails unless one of the arrays is empty. An array that is larger than memory has another error. Each array is its length, the size of
-/// an element and its name.
+/// Fails unless one of the arrays is empty. An array that cannot exist has another error, which the caller finds afterwards.
 #[cold]
 #[inline(never)]
-fn reject_overlap(one: (usize, usize, &str), other: (usize, usize, &str)) -> Outcome {
-    let is_possible = |(length, size, _): (usize, usize, &str)| {
-        length.checked_mul(size).is_some_and(|all| all > 0 && all <= isize::MAX as usize)
-    };
-    if !is_possible(one) || !is_possible(other) {
+fn reject_overlap<T, U>(one: (*const T, usize, &str), other: (*const U, usize, &str)) -> Outcome {
+    if one.1 == 0 || other.1 == 0 || is_odd(one.0, one.1) || is_odd(other.0, other.1) {
         return Ok(());
     }
     reject(format!("the arrays {} and {} overlap", one.2, other.2))
@@ -144,12 +140,16 @@ pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
 
 #[inline]
 fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
-    // `odd` is not 0 in two cases: the pointer is not aligned, or the size in bytes overflows `isize`.
-    let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
-    if pointer.is_null() || odd != 0 {
+    if pointer.is_null() || is_odd(pointer, length) {
         return reject_array(pointer, length, argument);
     }
     Ok(())
+}
+
+/// Returns whether the pointer is not aligned, or the size in bytes overflows `isize`.
+#[inline]
+fn is_odd<T>(pointer: *const T, length: usize) -> bool {
+    pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2()) != 0
 }
 
 #[cold]

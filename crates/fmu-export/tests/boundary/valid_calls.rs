@@ -116,12 +116,12 @@ impl ValidCall {
     }
 
     /// Lets the array to which the call writes begin in the middle of the one of its references, of which there are three, because the
-    /// fast paths take one, two or four. Returns whether the call has both.
-    pub fn overlap(&mut self) -> bool {
+    /// fast paths take one, two or four. Returns the number of the argument that is written; `None` if the call lacks one of the two.
+    pub fn overlap(&mut self) -> Option<usize> {
         let written = self.arguments.iter().rposition(|of| of.pointee().is_some_and(|(_, read)| !read));
         let first = self.arguments.first().and_then(Argument::pointee);
         let (Some(written), Some(("ValueReference", true))) = (written, first) else {
-            return false;
+            return None;
         };
         let reference = self.memory[0].as_mut_ptr().cast::<u32>();
         // SAFETY: the memory of an argument has at least 16 words, and `new` has written the first reference.
@@ -130,7 +130,7 @@ impl ValidCall {
         for (word, argument) in self.words.iter_mut().zip(self.arguments) {
             *word = if argument.of == "usize" { 3 } else { *word };
         }
-        true
+        Some(written)
     }
 
     /// Reads all values that a successful call must have written, so that Miri and valgrind detect uninitialized ones.
