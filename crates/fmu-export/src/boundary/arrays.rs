@@ -55,18 +55,18 @@ pub(crate) fn apart<T, U>(
     let [size, written] = [length.wrapping_mul(size_of::<T>()), count.wrapping_mul(size_of::<U>())];
     match other.wrapping_sub(begin) >= size && begin.wrapping_sub(other) >= written {
         true => Ok(()),
-        false => reject_overlap((pointer, length, name), (values, count, argument)),
+        false => {
+            let exist = size != 0 && written != 0 && !is_odd(pointer, length) && !is_odd(values, count);
+            reject_overlap(exist, name, argument)
+        }
     }
 }
 
-/// Fails unless one of the arrays is empty. An array that cannot exist has another error, which the caller finds afterwards.
+/// Fails if both arrays exist. One that is not empty and cannot exist has another error, which the caller finds afterwards.
 #[cold]
 #[inline(never)]
-fn reject_overlap<T, U>(one: (*const T, usize, &str), other: (*const U, usize, &str)) -> Outcome {
-    if one.1 == 0 || other.1 == 0 || is_odd(one.0, one.1) || is_odd(other.0, other.1) {
-        return Ok(());
-    }
-    reject(format!("the arrays {} and {} overlap", one.2, other.2))
+fn reject_overlap(exist: bool, name: &str, argument: &str) -> Outcome {
+    if exist { reject(format!("the arrays {name} and {argument} overlap")) } else { Ok(()) }
 }
 
 /// Checks that an array of `count` elements has the `needed` length; `what` describes the elements in the message.
