@@ -326,4 +326,16 @@ fn a_description_that_was_read_in_part_is_not_written() {
         <ModelVariables><ScalarVariable name='x' valueReference='0'><Real min='low'/></ScalarVariable></ModelVariables></fmiModelDescription>";
     let why = ModelDescription::parse(text).unwrap().to_xml().unwrap_err();
     assert!(why.contains("min of Real is \"low\", not a number"), "{why}");
+
+    // Types that are unknown, or that FMI 2.0 lacks.
+    let text = "<fmiModelDescription fmiVersion='3.0' modelName='m' instantiationToken='g'><CoSimulation modelIdentifier='m'/>\
+        <TypeDefinitions><Float99Type name='T'/></TypeDefinitions></fmiModelDescription>";
+    let mut description = ModelDescription::parse(text).unwrap();
+    assert!(description.to_xml().unwrap_err().starts_with("T cannot be written"));
+    description.types.clear();
+    description.variables =
+        vec![Variable::scalar("x", 0, BaseType::Float32, Causality::Local, Variability::Continuous)];
+    description.to_xml().unwrap();
+    description.standard = Standard::Fmi2;
+    assert!(description.to_xml().unwrap_err().starts_with("x cannot be written"));
 }

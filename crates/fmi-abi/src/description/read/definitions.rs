@@ -45,7 +45,7 @@ pub(super) fn declared_type(node: Node, standard: Standard, faults: &Faults) -> 
     }
 }
 
-/// Reads the attributes of a variable or a declared type. A variable has the attributes of its declared type except where it has its own.
+/// Reads the attributes of a declared type, or of a variable, which inherits those that it lacks from its declared type.
 pub(super) fn attributes(
     node: Node,
     base: Option<BaseType>,

@@ -32,7 +32,8 @@ fn unit_definition(name: &str, unit: &Unit) -> Element {
 }
 
 fn type_definition(standard: Standard, name: &str, of: &Type) -> Element {
-    let base = of.base.and_then(|base| base.element(standard)).unwrap_or("Clock");
+    // `to_xml` has rejected types that the FMI version lacks.
+    let base = of.base.and_then(|base| base.element(standard)).unwrap_or_default();
     let items = of.items.iter().map(|item| {
         Element::new("Item")
             .with("name", &item.name)

@@ -4,16 +4,17 @@ mod definitions;
 mod structure;
 mod variables;
 
-use super::{LogCategory, ModelDescription, Offer, offer::FLAGS};
-use crate::Standard;
+use super::{LogCategory, ModelDescription, Offer, Variable, offer::FLAGS};
 use crate::write::{Element, filled};
+use crate::{BaseType, Standard};
 
 impl ModelDescription {
     /// Returns the `modelDescription.xml` that [`parse`](Self::parse) reads as this description. The sizes of arrays are written as numbers,
-    /// also if they were read as structural parameters.
+    /// even where they were read from structural parameters.
     ///
     /// # Errors
-    /// Fails if the description has faults or an array of unknown size, because it then lacks a part of what was read.
+    /// Fails if the description has faults or an array of unknown size, because a part of what was read would be lost. Also fails if a
+    /// variable or a declared type has a type that the FMI version lacks or that is unknown.
     pub fn to_xml(&self) -> Result<String, String> {
         if let Some((_, why)) = self.faults.first() {
             return Err(format!("a model description with a fault cannot be written: {why}"));
@@ -23,6 +24,14 @@ impl ModelDescription {
                 "a model description with {}, whose size is unknown, cannot be written",
                 of.name
             ));
+        }
+        let is_known =
+            |base: Option<BaseType>| base.is_some_and(|base| base.element(self.standard).is_some());
+        let is_clock = |of: &Variable| of.base.is_none() && of.clock.is_some();
+        let variables = self.variables.iter().filter(|of| !is_known(of.base) && !is_clock(of));
+        let types = self.types.iter().filter(|(_, of)| !is_known(of.base));
+        if let Some(name) = variables.map(|of| &of.name).chain(types.map(|(name, _)| name)).next() {
+            return Err(format!("{name} cannot be written: its type is unknown in {}", self.standard));
         }
         let offers = [
             ("ModelExchange", &self.model_exchange),

@@ -26,7 +26,10 @@ impl ModelDescription {
         let start = (!list.is_empty()).then(|| list.join(" "));
         let element =
             self.with_value(with_common(Element::new(self.element_name(of)), of), of, start.as_ref());
-        let element = of.clock.as_deref().map_or(element.clone(), |clock| with_clock(element, clock));
+        let element = match of.clock.as_deref() {
+            Some(clock) => with_clock(element, clock),
+            None => element,
+        };
         with_attributes(element, &self.own_attributes(of))
             .containing(of.aliases.iter().map(alias))
             .containing(
@@ -36,12 +39,13 @@ impl ModelDescription {
     }
 
     fn element_name(&self, of: &Variable) -> &'static str {
+        // `to_xml` has rejected types that the FMI version lacks, so a variable without a type of values is a clock.
         of.base.and_then(|base| base.element(self.standard)).unwrap_or("Clock")
     }
 
-    /// Returns the attributes that a variable of FMI 3.0 repeats. Of those that its declared type has, too, only the range and the size are
-    /// repeated: fmi-sim 0.7 rejects an FMU in which a variable with a declared type also has a quantity, a unit or a nominal value, although
-    /// section 2.4.7.3 of FMI 3.0 allows that.
+    /// Returns the attributes that are written for a variable of FMI 3.0. It inherits its quantity, units and nominal value from its declared
+    /// type, because fmi-sim 0.7 rejects an FMU that repeats them, although section 2.4.7.3 of FMI 3.0 allows that. The range and the size
+    /// of bytes are repeated for importers that do not look types up.
     fn own_attributes(&self, of: &Variable) -> Attributes {
         let mut own = of.attributes.clone();
         let Some(declared) = of.declared_type.as_ref().and_then(|name| self.types.get(name)) else {
