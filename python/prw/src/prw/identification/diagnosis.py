@@ -40,14 +40,15 @@ AT_REST = 1e-3
 TRIED = 2
 #: A hypothesis is tried if its expected gain in likelihood exceeds this share of the largest expected gain.
 WORTH_TRYING = 0.05
-#: Gain in likelihood for each unknown below which a hypothesis counts as chance. A hypothesis that explains the data may gain COST less than
-#: others, because a fault of more than CLEAR standard errors is a misfit: otherwise, it would have no cause.
+#: Gain in likelihood for each unknown below which a hypothesis counts as chance. A hypothesis that does not explain the data must gain more,
+#: see `_search`. One that does needs no more, because a fault of more than CLEAR standard errors is a misfit: it must have a cause.
 COST = 12.0
 #: A fit with a hypothesis that does not explain the data is refined at most this number of times.
 REFINED = 2
 #: Hypotheses that explain the data with a gain in likelihood that differs by less than this are not distinguished.
 ALIKE_GAIN = 25.0
-#: Maximum number of hypotheses that are combined. A further one must gain more than this share of the first one's gain.
+#: Maximum number of hypotheses that are combined. A further one that does not explain the data must gain more than this share of the first
+#: one's gain.
 MOST, SECOND = 3, 0.01
 #: The hypothesis that the inertias differ from the drawing, and their standard deviation in the fit that frees them.
 INERTIAS, DRAWING = Hypothesis("inertias", ("J2", "J3", "H3")), 0.1
@@ -131,62 +132,89 @@ class _Trial(NamedTuple):
     verdict: Verdict
 
 
+class _Round(NamedTuple):
+    """A cause that was found, with the fit that also includes those before it, and other causes that may be there in its place."""
+
+    best: _Trial
+    rivals: list[_Trial]
+
+
 def explain(solution: Solution, verdict: Verdict) -> Explanation:
     """Search for causes of a misfit."""
     found = [cause for i, e in enumerate(solution.fitter.experiments) for cause in _obvious_causes(solution, i, e)]
     if found:
         return Explanation(solution, verdict, tuple(map(Cause, dict.fromkeys(found))), ())
-    best = _Trial(INERTIAS, 0.0, solution, verdict)
-    chosen: list[_Trial] = []
-    rivals: list[_Trial] = []
-    tried: dict[str, None] = {}
-    others: dict[str, None] = {}
-    for _ in range(MOST):
-        trials, fitted, left_out = _trials(best.solution, best.verdict)
-        tried.update(dict.fromkeys(map(str, fitted)))
-        others.update(dict.fromkeys(map(str, left_out)))
-        first = chosen[0].gain if chosen else 0.0
-        likely = [t for t in trials if t.gain > max(CLEAR**2 - COST * t.verdict.fits, SECOND * first)]
-        if not likely:
-            break
-        best, rest = likely[0], [t for t in trials if t is not likely[0]]
-        for _ in range(REFINED):
-            # Far from the solution, the patterns of large effects need more rounds.
-            if best.verdict.fits:
-                break
-            before, refined = best.solution.deviance, refitted(best.solution, tolerances=FINE)
-            best = best._replace(solution=refined, verdict=judge(refined))
-            if before - refined.deviance < COST:
-                break
-        chosen.append(best)
-        rivals = [t for t in rest if t.verdict.fits and t.gain > best.gain - ALIKE_GAIN]
-        # A delay of more channels is not another cause.
-        rivals = [
-            t
-            for t in rivals
-            if t.hypothesis.kind != best.hypothesis.kind or not set(t.hypothesis.places) & set(best.hypothesis.places)
-        ]
-        # A gain of all torques and wrong inertias have nearly the same effect.
-        if best.hypothesis == INERTIAS or _all_torques(best.hypothesis, solution):
-            rivals += [t for t in rest if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, solution)]
-        rivals = list({t.hypothesis: t for t in rivals}.values())
-        # If the first cause explains no channel, further ones would be guesses.
-        if best.verdict.fits or len(best.verdict.misfits) >= len(verdict.misfits) > 1:
-            break
-    causes, unlikely = _described(best, chosen, rivals), tuple(name for name in others if name not in tried)
-    if not best.verdict.fits or not all(each.hypothesis.belongs for each in [*chosen, *rivals]):
-        return Explanation(solution, verdict, tuple(causes), tuple(tried), best.verdict.fits, unlikely)
+    rounds, tried, left_out = _search(solution, verdict)
+    known = bool(rounds) and rounds[-1].best.verdict.fits
+    # If the first cause alone explains no channel, and all together do not explain the data, further ones would be guesses.
+    if not known and rounds and len(rounds[0].best.verdict.misfits) >= len(verdict.misfits) > 1:
+        rounds = rounds[:1]
+    named = Explanation(solution, verdict, tuple(_described(rounds)), tried, known, left_out)
+    assumed = [trial for best, rivals in rounds for trial in (best, *rivals)]
+    if not known or not all(trial.hypothesis.belongs for trial in assumed):
+        return named
+    best, rivals = rounds[-1]
     exact = refitted(best.solution, tolerances=FINE)
     judged = judge(exact)
     if not judged.fits:
-        return Explanation(solution, verdict, tuple(causes), tuple(tried), left_out=unlikely)
+        return named
     # The intervals contain the estimates with every rival.
     count, widening = len(solution.task.names), judged.widening.copy()
     for rival in rivals:
         widening[:count] = np.hypot(
             widening[:count], (rival.solution.logarithms - exact.logarithms[: len(rival.solution.logarithms)])[:count]
         )
-    return Explanation(exact, judged._replace(widening=widening), tuple(causes), tuple(tried), left_out=unlikely)
+    return named._replace(solution=exact, verdict=judged._replace(widening=widening))
+
+
+def _search(solution: Solution, verdict: Verdict) -> tuple[list[_Round], tuple[str, ...], tuple[str, ...]]:
+    """Add one cause after the other until the data fit. Returns these causes, and the names of the hypotheses that were tried and of
+    those that were not."""
+    rounds: list[_Round] = []
+    tried: dict[str, None] = {}
+    others: dict[str, None] = {}
+    last = _Trial(INERTIAS, 0.0, solution, verdict)
+    while len(rounds) < MOST and not last.verdict.fits:
+        trials, fitted, left_out = _trials(last.solution, last.verdict)
+        tried.update(dict.fromkeys(map(str, fitted)))
+        others.update(dict.fromkeys(map(str, left_out)))
+        first = rounds[0].best.gain if rounds else 0.0
+        likely = [t for t in trials if t.gain > (0 if t.verdict.fits else max(CLEAR**2, SECOND * first))]
+        if not likely:
+            break
+        last = _refined(likely[0])
+        rounds.append(_Round(last, _rivals(last, [t for t in trials if t is not likely[0]])))
+    return rounds, tuple(tried), tuple(name for name in others if name not in tried)
+
+
+def _refined(trial: _Trial) -> _Trial:
+    """The trial with a more exact fit, unless it fits: far from the solution, the patterns of large effects need more rounds."""
+    for _ in range(REFINED):
+        if trial.verdict.fits:
+            break
+        before, refined = trial.solution.deviance, refitted(trial.solution, tolerances=FINE)
+        trial = trial._replace(solution=refined, verdict=judge(refined))
+        if before - refined.deviance < COST:
+            break
+    return trial
+
+
+def _rivals(best: _Trial, rest: list[_Trial]) -> list[_Trial]:
+    """The trials among `rest` that the data do not distinguish from the best one."""
+    kind, places = best.hypothesis
+    alike = [
+        t
+        for t in rest
+        if t.verdict.fits
+        and t.gain > best.gain - ALIKE_GAIN
+        # A delay of more channels is not another cause.
+        and (t.hypothesis.kind != kind or not set(t.hypothesis.places) & set(places))
+    ]
+    # A gain of all torques and wrong inertias have nearly the same effect.
+    scales = [t for t in rest if t.hypothesis == INERTIAS or _all_torques(t.hypothesis, t.solution)]
+    if best.hypothesis == INERTIAS or _all_torques(best.hypothesis, best.solution):
+        alike += scales
+    return list({t.hypothesis: t for t in alike}.values())
 
 
 class Part(NamedTuple):
@@ -288,7 +316,7 @@ def _trials(solution: Solution, verdict: Verdict) -> tuple[list[_Trial], list[Hy
             unknowns = max(len(hypothesis.distortions), 3 if not hypothesis.distortions else 1)
             gain = solution.deviance - found.deviance - COST * unknowns
             if not hypothesis.positive or all(x > 0 for x in found.logarithms[-len(hypothesis.distortions) :]):
-                trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > CLEAR**2 - COST else verdict))
+                trials.append(_Trial(hypothesis, gain, found, judge(found) if gain > 0 else verdict))
     return sorted(trials, key=lambda trial: -trial.gain), chosen, left_out
 
 
@@ -302,15 +330,15 @@ def _including(solution: Solution, hypothesis: Hypothesis) -> Solution:
     return refitted(solution, hypothesis.distortions)
 
 
-def _described(best: _Trial, chosen: list[_Trial], rivals: list[_Trial]) -> list[Cause]:
-    """The causes in words, of the fit with all of them, and rivals of the last one."""
-    found = []
-    for i, trial in enumerate(chosen):
-        last = trial is chosen[-1]
-        then = "with that, the data fit" if last and trial.verdict.fits else "that explains a part of the misfit"
-        found.append(_cause(trial, best.solution, f"{'besides, ' if i else ''}", then))
-    for rival in rivals:
-        kinds = {best.hypothesis.kind, rival.hypothesis.kind}
+def _described(rounds: list[_Round]) -> list[Cause]:
+    """The causes in words, with their sizes in the fit with all of them, and rivals of the last one."""
+    found: list[Cause] = []
+    for best, _ in rounds:
+        last = rounds[-1].best
+        then = "with that, the data fit" if best is last and last.verdict.fits else "that explains a part of the misfit"
+        found.append(_cause(best, last.solution, "besides, " if found else "", then))
+    for rival in rounds[-1].rivals if rounds else ():
+        kinds = {rounds[-1].best.hypothesis.kind, rival.hypothesis.kind}
         fits = "fits as well" if rival.verdict.fits else "explains a part"
         found.append(_cause(rival, rival.solution, "or ", fits)._replace(hint=_deciding(kinds)))
     return found
@@ -426,8 +454,8 @@ def _size(distortion: Distortion, value: float, error: float) -> tuple[str, str]
         return f"lags with a time constant of {'-' if value < 0 else ''}{sized} ms", distortion.channel
     if distortion.kind == "delay":
         return f"comes {sized} ms {'late' if value > 0 else 'early'}", distortion.channel
-    amount = rounded(value / kind.factor, error * kind.scale / kind.factor)
-    return f"of {' +- '.join(amount)} {kind.unit}", str(distortion)
+    name, size = kind.worded(str(distortion), value, error * kind.scale)
+    return f"of {size}", name
 
 
 def _obvious_causes(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:

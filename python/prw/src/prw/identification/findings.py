@@ -127,9 +127,8 @@ class Findings:
         """Properties of the rig that the FMU does not model and that the fit includes, with their sizes."""
         task, found = self.solution.task, []
         for d in task.distortions:
-            kind, (value, error) = KINDS[d.kind], self.distortions[str(d)]
-            if kind.belongs:
-                found.append(f"{d} of {' +- '.join(rounded(value / kind.factor, error / kind.factor))} {kind.unit}")
+            if KINDS[d.kind].belongs:
+                found.append(" of ".join(KINDS[d.kind].worded(str(d), *self.distortions[str(d)])))
         return found + ([f"slow drift of {', '.join(task.drift)}"] if task.drift else [])
 
     def kind_of(self, name: str) -> Kind:
@@ -253,11 +252,7 @@ class Findings:
                 lines.append("measurements of theta3 and theta4 distinguish solutions with exchanged couplings")
         first = self.verdict.suggested
         if self.fits and first is not None and not sure.undetermined:
-            kind = KINDS.get(first.hypothesis.kind)
-            factor = kind.factor if kind else 1.0
-            size = " +- ".join(rounded(first.size / factor, first.error / factor))
-            size = f"{size} {first.hypothesis.unit}".rstrip()
-            lines.append(f"intervals allow for a {first.name} of {size}, which the data suggest but do not prove")
+            lines.append(f"intervals allow for a {first}, which the data suggest but do not prove")
         if gain := common_gain(solution):
             lines.append(
                 f"a gain of all torques of {np.exp(gain):.4g} has the same effect as inertias that differ from the start values by "

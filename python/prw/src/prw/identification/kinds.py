@@ -6,6 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from prw.identification.rounding import rounded
+
+#: Beginning of the names of decreases, and of increases.
+FALL, RISE = "decrease", "increase"
+
 
 class Kind(NamedTuple):
     """A kind of distortion, which is an argument of `identify`.
@@ -30,6 +35,12 @@ class Kind(NamedTuple):
     factor: float = 1.0
     belongs: bool = False
     positive: bool = False
+
+    def worded(self, name: str, value: float, error: float) -> tuple[str, str]:
+        """The name of a distortion of this kind and its size in words; a negative decrease is an increase. value, error: SI."""
+        if value < 0 and name.startswith(FALL):
+            name, value = RISE + name.removeprefix(FALL), -value
+        return name, f"{' +- '.join(rounded(value / self.factor, error / self.factor))} {self.unit}".rstrip()
 
 
 #: The kinds of distortions by argument.
@@ -97,7 +108,7 @@ KINDS = {
     # Only on request, because the data of a jump, which has another value at the beginning, fit an even decrease, too.
     "softening": Kind(
         1e-2,
-        {name: f"decrease of {name} over the recording" for name in ("k1", "k2")},
+        {name: f"{FALL} of {name} over the recording" for name in ("k1", "k2")},
         "%",
         1e-2,
     ),

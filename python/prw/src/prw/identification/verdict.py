@@ -16,7 +16,7 @@ from scipy.special import fdtrc
 
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Comparison, Solution, slow
-from prw.identification.kinds import FILTERS, KINDS
+from prw.identification.kinds import FILTERS, KINDS, Kind
 from prw.identification.response import Distortion
 from prw.identification.statistics import MARGIN, covariance_of, information_of
 from prw.motion import Array
@@ -66,11 +66,6 @@ class Hypothesis(NamedTuple):
     def distortions(self) -> tuple[Distortion, ...]:
         """The distortions of the hypothesis; none for a drift."""
         return tuple(Distortion(self.kind, place) for place in self.places if self.kind in KINDS)
-
-    @property
-    def unit(self) -> str:
-        """Unit of its size in messages."""
-        return KINDS[self.kind].unit if self.kind in KINDS else ""
 
     @property
     def signs(self) -> bool:
@@ -127,10 +122,9 @@ class Fault(NamedTuple):
     per_error: Array
     gain: float
 
-    @property
-    def name(self) -> str:
-        """Name of the fault."""
-        return str(self.hypothesis)
+    def __str__(self) -> str:
+        kind = KINDS.get(self.hypothesis.kind, Kind(1.0))
+        return " of ".join(kind.worded(str(self.hypothesis), self.size, self.error))
 
     @property
     def signs(self) -> bool:
@@ -257,13 +251,8 @@ def judge(solution: Solution) -> Verdict:
     if clear and not misfits:
         fault = clear[0]
         e = solution.fitter.experiments[0]
-        kind, places = fault.hypothesis
-        factor = KINDS[kind].factor if kind in KINDS else 1.0
-        sized = f"{fault.size / factor:.3g} +- {fault.error / factor:.1g} {fault.hypothesis.unit}".rstrip()
-        for channel in [name for name in e.channels if name in places] or ["all"]:
-            misfits.append(
-                Misfit(e.name, channel, 0.0, e.band, f"{fault.name} of {sized} would explain more of the data")
-            )
+        for channel in [name for name in e.channels if name in fault.hypothesis.places] or ["all"]:
+            misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{fault} would explain more of the data"))
     return Verdict(tuple(misfits), tuple(faults), widening)
 
 
