@@ -108,7 +108,7 @@ help:
 	@echo 'make bench                   compare the speed of the FMU with C    -> dev/benches/ratios.json'
 	@echo 'make instructions            count the instructions of about 25 uses, with callgrind, into the table that make test compares'
 	@echo 'make figures                 draw the figures of the paper          -> out/*.svg, out/*.png'
-	@echo 'make monte-carlo             identify 300 simulated rigs and 1630 with faults or effects of real rigs -> out/'
+	@echo 'make monte-carlo             identify 300 simulated rigs and 1724 with faults or effects of real rigs -> out/'
 	@echo 'make fuzz                    search for calls that break the FMU, and for files that break the readers, 10 minutes each'
 	@echo '                             (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                run the tests under address, leak, thread and real-time sanitizers and valgrind'

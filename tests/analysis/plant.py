@@ -69,6 +69,8 @@ class Case(NamedTuple):
         Factors from k1, k2, c1 and c2 to the values of side 2.
     viscous
         N.m.s/rad, of the two input shafts and of the two shafts between the couplings.
+    loose
+        Whether the dampers of the couplings have the play, too. Then their sides press against each other, but do not pull.
     """
 
     seed: int
@@ -82,6 +84,7 @@ class Case(NamedTuple):
     falling: float = 0.0
     sides: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     viscous: tuple[float, float] = (0.0, 0.0)
+    loose: bool = False
 
 
 def drives(random: np.random.Generator, motion: str, reach: float = 0.5) -> np.ndarray:
@@ -121,6 +124,7 @@ def experiments(cases: Sequence[Case], duration: float = 8.0, rate: float = 1000
     j2, j3, h3 = np.array([c.inertia for c in cases]).T * np.array([[J2], [J3], [H3]])
     output_friction, softening, falling = np.array([(c.output_friction, c.softening, c.falling) for c in cases]).T
     slow, between = np.array([c.viscous for c in cases]).T
+    loose = np.array([c.loose for c in cases]) & (play > 0)
     # (side, case)
     k1, k2, c1, c2 = (np.stack([p, p * f]) for p, f in zip((k1, k2, c1, c2), np.array([c.sides for c in cases]).T))
 
@@ -131,6 +135,9 @@ def experiments(cases: Sequence[Case], duration: float = 8.0, rate: float = 1000
     def spring(k: np.ndarray, i: int, twist: np.ndarray) -> np.ndarray:
         return k * (twist - np.clip(twist, -play[i] / 2, play[i] / 2) + cubic[i] * twist**3)
 
+    def lets_go(i: int, twist: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        return loose[i] & ((np.abs(twist) <= play[i] / 2) | (torque * twist < 0))
+
     def torques(time: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns the torques on the motors, and the torques and rates of the shafts between the couplings."""
         (angle, omega), soft = motors(time), 1 - softening * (time > duration / 2)
@@ -138,7 +145,13 @@ def experiments(cases: Sequence[Case], duration: float = 8.0, rate: float = 1000
         first = spring(k1 * soft, 0, angle - x[:2])
         second = spring(k2 * (1 - falling * time / duration), 1, x[:2] - x[2:4])
         shaft_rate = (first + c1 * omega - second + c2 * x[4:]) / (c1 + c2 + between)
-        return -first - c1 * (omega - shaft_rate), second + c2 * (shaft_rate - x[4:]), shaft_rate
+        # If one coupling transmits nothing, the rate is that with which the other one transmits nothing either.
+        open_1 = lets_go(0, angle - x[:2], first + c1 * (omega - shaft_rate))
+        open_2 = lets_go(1, x[:2] - x[2:4], second + c2 * (shaft_rate - x[4:]))
+        shaft_rate = np.where(open_1, (c2 * x[4:] - second) / (c2 + between), shaft_rate)
+        shaft_rate = np.where(open_2, (first + c1 * omega) / (c1 + between), shaft_rate)
+        on_motors = np.where(open_1, 0.0, -first - c1 * (omega - shaft_rate))
+        return on_motors, np.where(open_2, 0.0, second + c2 * (shaft_rate - x[4:])), shaft_rate
 
     def slope(time: float, flat: np.ndarray) -> np.ndarray:
         x = flat.reshape(6, -1)

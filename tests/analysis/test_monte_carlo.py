@@ -36,7 +36,7 @@ def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys
 
 @pytest.mark.long
 def test_rigs_with_what_reality_adds(fmu, tmp_path, monkeypatch):
-    chosen = ("friction", "crosstalk", "jitter", "wrapped")
+    chosen = ("friction", "crosstalk", "jitter", "wrapped", "springs, turned")
     monkeypatch.setattr(monte_carlo, "REAL", {name: monte_carlo.REAL[name] for name in ("nothing", *chosen)})
     monkeypatch.setattr(monte_carlo, "commit", lambda: "0123abc")
     out = tmp_path / "real.json"

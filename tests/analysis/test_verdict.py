@@ -164,6 +164,16 @@ def test_a_shaft_that_rests_while_the_other_one_moves_is_not_stuck():
     assert message.startswith("theta3 is stuck from 1 to 1.6")
 
 
+@pytest.mark.parametrize("cut, messages", [(0.0, []), (0.002, ["theta3 is cut off at 0.2982 (SI), 4 times: "])])
+def test_an_encoder_whose_angle_turns_does_not_saturate(cut, messages):
+    """An encoder with coarse steps shows some equal values at both ends of a slow motion, with or without saturation."""
+    time, quantum = np.arange(4000) / 1000, 6e-4
+    angle = 0.3 * np.sin(2 * np.pi * time)
+    column = np.minimum(quantum * np.round(angle / quantum), quantum * np.round((0.3 - cut) / quantum))
+    found = list(_flat("theta3", time, column, np.ones(len(time), dtype=bool), angle, hidden=3e-3))
+    assert [each[: len(message)] for each, message in zip(found, messages, strict=True)] == messages
+
+
 @pytest.mark.long
 def test_two_faults_are_both_named(experiment, fmu):
     """Friction causes the larger part of the misfit, and torques that are 1 ms late the rest."""

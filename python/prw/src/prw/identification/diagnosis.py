@@ -30,7 +30,7 @@ SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1
 TOLERANCE = 1.7
 #: Correlation above which two signals are alike, and below which they are unlike.
 ALIKE, UNLIKE = 0.9, 0.7
-#: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range. A channel that is constant
+#: A channel saturates if at least FLATS sequences of FLAT equal values are at an end of its range, beyond which the model goes. A channel that is constant
 #: for longer than STUCK, s, mostly while the motors move, is stuck if the model moves it by more than HIDDEN steps of its encoder, and by
 #: more than this multiple of its noise.
 FLAT, FLATS, STUCK, HIDDEN = 4, 3, 0.25, 5.0
@@ -536,12 +536,14 @@ def _flat(
     usual = float(np.median(long))
     if usual > 2:
         return
-    saturated = False
-    for level, side in ((column.max(), "above"), (column.min(), "below")):
-        flats = (column[first] == level) & (long >= FLAT)
-        if flats.sum() >= FLATS:
+    saturated, step = False, quantum_of(column)
+    for level, sign, side in ((column.max(), 1, "above"), (column.min(), -1, "below")):
+        flats = [slice(first[k], last[k] + 1) for k in np.flatnonzero((column[first] == level) & (long >= FLAT))]
+        # An encoder also shows equal values where its angle turns.
+        times = sum((sign * (modelled[flat] - level)).max() > step for flat in flats)
+        if times >= FLATS:
             saturated = True
-            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and values {side} are lost"
+            yield f"{name} is cut off at {level:.4g} (SI), {times} times: it saturates, and values {side} are lost"
     if saturated:
         return
     longest = int(np.argmax(long))

@@ -12,12 +12,14 @@ the reaction of the massless shaft, so the part of the effect during which the c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from prw.columns import CHANNELS
@@ -34,6 +36,11 @@ TURNING = 0.02
 LARGEST, LARGEST_NEGATIVE = 2.0, 0.5
 #: Clearance in rad at which the pattern of a clearance is calculated that the motion does not contain.
 SMALL = 1e-4
+#: Longest step in s with which effects are followed; longer sampling steps are divided. The torque of a coupling with clearance changes within
+#: about a tenth of the 5 ms in which the massless shafts follow.
+LONGEST_STEP = 5e-4
+#: A sampling step may exceed it by this share, because times have rounding errors.
+INEXACT = 0.01
 #: Time in s after which the states have forgotten how they began.
 SETTLED = 1.0
 #: Rounds in which a smooth effect and the state at the end of a step are adjusted to each other.
@@ -257,27 +264,32 @@ def columns(
     initial: (6,), see Comparison. sizes: of all effects that the motion contains; wanted ones without a size count as small."""
     count = len(experiment.time)
     states = np.fft.irfft(response.moving(initial), count, axis=0, norm="ortho")
+    motion = _motion_without(states, experiment)
     laws = {d: found for d in {**sizes, **dict.fromkeys(wanted)} if (found := law(d, model, values)) is not None}
     present = {
         d: size for d, size in sizes.items() if d in laws and (size > 0 or (size and not KINDS[d.kind].positive))
     }
-    moved, strengths = _moved(model.A * experiment.step, laws, present, states, experiment)
+    moved, strengths = _moved(model.A * motion.step, laws, present, motion)
     contributions: dict[Distortion, Complex] = {}
     constant: Complex = np.zeros_like(response.outputs)
-    motors = _motors(experiment)
+    stepped = _held(model.A * motion.step, np.zeros((6, 0)))[0]
     rows = [CHANNELS.index(name) for name in experiment.channels]
     for d in wanted:
         if d not in laws:
             contributions[d] = _of_sensors(d, experiment, response, initial, sizes)
             continue
-        signals = laws[d].signals(moved, motors)
+        signals = laws[d].signals(moved, motion.motors)
         of, fixed, size = laws[d].of, laws[d].fixed, sizes.get(d, 0.0)
         at = -sign(signals) if of is None else of(signals, size)
         during = _mean_of_cubic(at) if laws[d].smooth else strengths[d] if d in strengths else _mean(at)
-        _, gain = _held(model.A * experiment.step, laws[d].drive * experiment.step)
+        _, gain = _held(model.A * motion.step, laws[d].drive * motion.step)
 
         def driven(during: Array, at: Array, gain: Array = gain, direct: Array = laws[d].direct[rows]) -> Complex:
-            return response.driven(spectra(during) @ gain.T, spectra(at) @ direct.T)
+            # The states at the end of a sampling step, from the effect in all parts of the step.
+            added = np.zeros((count, 6))
+            for part in range(motion.parts):
+                added = added @ stepped.T + during[part :: motion.parts] @ gain.T
+            return response.driven(spectra(added), spectra(at[:: motion.parts]) @ direct.T)
 
         if fixed is not None and d in present:
             growing = np.where(fixed(signals, size) == 0, at, 0.0)
@@ -290,6 +302,36 @@ def columns(
 def _motors(experiment: Experiment) -> Array:
     """The motors' angles and rates, and the time from 0 to 1: (n, 5)."""
     return np.hstack([experiment.theta, experiment.omega, np.linspace(0, 1, len(experiment.time))[:, None]])
+
+
+class _Motion(NamedTuple):
+    """The motion without effects.
+
+    Attributes
+    ----------
+    states, motors
+        (n, 6), and (n, 5) as in `_motors`.
+    step
+        s.
+    parts
+        Number of steps in a sampling step.
+    """
+
+    states: Array
+    motors: Array
+    step: float
+    parts: int
+
+
+def _motion_without(states: Array, experiment: Experiment) -> _Motion:
+    """The motion without effects. If the sampling steps are long, it is interpolated. states: (n, 6), at the samples."""
+    rows, parts = np.hstack([states, _motors(experiment)]), max(1, math.ceil(experiment.step / LONGEST_STEP - INEXACT))
+    if parts > 1:
+        at = np.arange((len(rows) - 1) * parts + 1) / parts
+        # The spectra count the recording as periodic, so the first row follows the last one.
+        ends = np.linspace(rows[-1], rows[0], parts, endpoint=False)[1:]
+        rows = np.vstack([CubicSpline(np.arange(len(rows)), rows)(at), ends])
+    return _Motion(rows[:, :6], rows[:, 6:], experiment.step / parts, parts)
 
 
 def _mean(values: Array) -> Array:
@@ -358,20 +400,20 @@ def _moved(
     A: Array,
     laws: Mapping[Distortion, Law],
     sizes: Mapping[Distortion, float],
-    states: Array,
-    experiment: Experiment,
+    motion: _Motion,
 ) -> tuple[Array, dict[Distortion, Array]]:
     """The states (n, 6) with the effects in `sizes`, and the mean of each of these effects during every step per unit of its size
-    (n, m). A: times the step. states: (n, 6) without effects."""
+    (n, m). A: times the step."""
+    states = motion.states
     if not sizes:
         return states, {}
-    motors, stepped = _motors(experiment), _held(A, np.zeros((6, 0)))[0]
+    stepped = _held(A, np.zeros((6, 0)))[0]
     towards, ends = np.vstack([np.eye(6), *(laws[d].follows[0] for d in sizes)]), [6]
     steps = []
     for d, size in sizes.items():
         ends.append(ends[-1] + len(laws[d].follows[0]))
-        gain = towards @ (size * _held(A, laws[d].drive * experiment.step)[1])
-        signals = laws[d].signals(states, motors)
+        gain = towards @ (size * _held(A, laws[d].drive * motion.step)[1])
+        signals = laws[d].signals(states, motion.motors)
         part = slice(*ends[-2:])
         steps.append((size, gain, gain[part], part, laws[d], signals.tolist(), np.zeros((len(states), gain.shape[1]))))
     # The shift of the states and of all signals at the end of a step, from the shift of the states at its beginning.
@@ -410,7 +452,7 @@ def _moved(
         return end
 
     # The spectra count the recording as periodic, so the first row follows the last one.
-    end = follow(max(len(states) - int(SETTLED / experiment.step) - 1, 0), np.zeros(6))
+    end = follow(max(len(states) - int(SETTLED / motion.step) - 1, 0), np.zeros(6))
     follow(0, stepped @ end)
     moved: Array = states + shifts
     return moved, {d: found for d, (*_, found) in zip(sizes, steps)}

@@ -133,7 +133,9 @@ class Identification(Findings):
                 "additions": self.additions,
                 "assumed": list(self.assumed),
                 "stopped": self.stopped,
-                "tried": [{"fault": str(f.hypothesis), "size": f.size, "standard_error": f.error} for f in self.verdict.faults],
+                "tried": [
+                    {"fault": str(f.hypothesis), "size": f.size, "standard_error": f.error} for f in self.verdict.faults
+                ],
                 "fitted": list(self.explanation.tried),
                 "not_fitted": list(self.explanation.left_out),
             },
