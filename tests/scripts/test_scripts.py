@@ -37,6 +37,12 @@ name = "a number is hexadecimal"
 file = "status.rs"
 old = "            4 => Self::Fatal,"
 new = "            0x4 => Self::Fatal,"
+
+[[fault]]
+name = "a status has no name"
+file = "status.rs"
+old = "            4 => Self::Fatal,"
+new = "            4 => Self::,"
 """
 
 
@@ -92,8 +98,13 @@ def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
     faults.write_text(FAULTS, encoding="utf-8")
     command = [sys.executable, "dev/tools/seeded_faults.py", str(faults)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 1 and done.stderr == ""
-    assert done.stdout == "found    Pending is a status\nescaped  a number is hexadecimal\n1 of 2 faults found\n"
+    assert done.returncode == 1 and "the next fault do not compile" in done.stderr
+    assert done.stdout.splitlines() == [
+        "found    Pending is a status",
+        "escaped  a number is hexadecimal",
+        "stale    a status has no name",
+        "1 of 3 faults found",
+    ]
 
 
 def test_docs_are_written(tmp_path: Path) -> None:
