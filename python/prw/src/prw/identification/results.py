@@ -13,7 +13,6 @@ from prw.columns import MOTORS, si_unit
 from prw.errors import need
 from prw.files import write_text
 from prw.identification.findings import Findings
-from prw.identification.rounding import rounded
 
 
 class Identification(Findings):
@@ -58,10 +57,8 @@ class Identification(Findings):
             sureness = f"+- {found.relative:.2%}   95 % interval {low} to {high}"
             sureness = "not determined" if found.hopeless else sureness
             lines.append(f"  {name:<9} {estimate} {found.unit}  {sureness}{', prior' if found.prior else ''}")
-        for name, (value, error) in self.distortions.items():
-            kind = self.kind_of(name)
-            size = " +- ".join(rounded(value / kind.factor, error / kind.factor))
-            lines.append(f"  {name}: {size} {kind.unit}".rstrip())
+        for name, pair in self.distortions.items():
+            lines.append("  " + ": ".join(self.kind_of(name).worded(name, *pair)))
         noise = (f"{name} {value:.2g} {si_unit(name)}" for name, value in self.solution.noise.items())
         lines.append("noise       " + ", ".join(noise))
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
