@@ -356,6 +356,13 @@ def test_mappings_of_any_kind(made):
     np.testing.assert_allclose(found["y", "gain"], 1.0)
 
 
+def test_a_start_value_that_is_no_number_is_kept_as_written(made):
+    fmu = made("plain", changes={'"tunable"><Real start="0"/>': '"tunable"><Real start="7 .5"/>'})
+    assert fmu.variables["gain"].start == "7 .5"
+    with pytest.raises(ValueError, match=r"the start value of gain in the FMU is '7 \.5', not a number"):
+        fmu.sensitivities(TIME, outputs=["y"], parameters=["gain"])
+
+
 def test_inputs_with_their_own_times(made):
     fmu = made("plain")
     runs = fmu.run(
@@ -377,6 +384,7 @@ def test_inputs_with_their_own_times(made):
         (([1.0, 0.0], [1.0, 2.0]), "the times of u decrease: 0 follows 1"),
         (([[0.0], [1.0]], [1.0, 2.0]), "the times of u have the shape (2, 1)"),
         (([0.0, 1.0], [1.0, 2.0], "deg"), "u has no unit"),
+        (([0.0, 1.0], [1.0, 2.0], [3.0, 4.0]), "u is a tuple of three, (times, values, unit), but its unit is no string"),
     ]:
         with pytest.raises(ValueError, match=re.escape(why)):
             fmu.run(TIME, inputs={"u": value}, outputs=["u"])

@@ -33,24 +33,23 @@ impl Baseline {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text =
             std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-        Self::parse(&text).map_err(|line| {
-            anyhow::anyhow!(
-                "{}: line {line} is not of the form NAME: REASON or NAME \"PART OF THE OBSERVATION\": REASON",
-                path.display()
-            )
-        })
+        Self::parse(&text).map_err(|(line, why)| anyhow::anyhow!("{}: line {line} {why}", path.display()))
     }
 
-    /// Parses the lines of a baseline; the error is the number of the first invalid line.
-    fn parse(text: &str) -> Result<Self, usize> {
+    /// Parses the lines of a baseline; the error is the number of the first invalid line, and what is wrong with it.
+    fn parse(text: &str) -> Result<Self, (usize, String)> {
+        let form = |number| {
+            let why = "is not of the form NAME: REASON or NAME \"PART OF THE OBSERVATION\": REASON";
+            (number, why.to_owned())
+        };
         let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let accepted =
             lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
-                let end = line.find([':', ' ', '\t']).ok_or(number)?;
+                let end = line.find([':', ' ', '\t']).ok_or_else(|| form(number))?;
                 let (name, rest) = (&line[..end], line[end..].trim_start());
                 let (text, reason) = match rest.strip_prefix('"') {
                     Some(rest) => {
-                        let (text, rest) = rest.split_once('"').ok_or(number)?;
+                        let (text, rest) = rest.split_once('"').ok_or_else(|| form(number))?;
                         (Some(text.to_owned()), rest.trim_start())
                     }
                     None => (None, rest),
@@ -63,7 +62,11 @@ impl Baseline {
                     Some(reason) if known => {
                         Ok(Accepted { name: name.to_owned(), text, reason: reason.to_owned() })
                     }
-                    _ => Err(number),
+                    Some(_) => Err((
+                        number,
+                        format!("has {name:?}, which is no rule, topic or interface; see --explain all"),
+                    )),
+                    None => Err(form(number)),
                 }
             });
         Ok(Self { accepted: accepted.collect::<Result<_, _>>()? })
@@ -130,13 +133,14 @@ mod tests {
 
     #[test]
     fn a_line_without_reason_or_with_an_unknown_name_is_an_error() {
-        for (text, line) in [
-            ("logs.silent", 1),
-            ("# all\nlogs.silent:", 2),
-            ("logs.silen: typo", 1),
-            ("logs.silent \"a: b", 1),
+        for (text, line, part) in [
+            ("logs.silent", 1, "is not of the form NAME: REASON"),
+            ("# all\nlogs.silent:", 2, "is not of the form NAME: REASON"),
+            ("logs.silen: typo", 1, "has \"logs.silen\", which is no rule"),
+            ("logs.silent \"a: b", 1, "is not of the form NAME: REASON"),
         ] {
-            assert_eq!(Baseline::parse(text).err(), Some(line), "{text}");
+            let (number, why) = Baseline::parse(text).err().unwrap_or_default();
+            assert!(number == line && why.starts_with(part), "{text}: {number} {why}");
         }
         assert!(Baseline::parse("scheduled-execution: not used").is_ok());
     }

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Arguments {
     /// The FMU
-    #[arg(required_unless_present = "explain")]
+    #[arg(required_unless_present = "explain", conflicts_with = "explain")]
     fmu: Option<std::path::PathBuf>,
     #[command(flatten)]
     options: fmu_check::Options,

@@ -8,6 +8,9 @@ use std::path::PathBuf;
 /// Topics that are not part of a quick check.
 const LONG: [&str; 2] = ["malformed", "resources"];
 
+/// Longest duration that an option may have, s; about 11 days.
+const LONGEST: f64 = 1e6;
+
 /// Options of a check, which are also the options of the command line.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
@@ -23,11 +26,11 @@ pub struct Options {
         rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
     /// Maximum duration of the check in seconds, including the repetitions that prove findings.
-    #[arg(long, default_value_t = 120.0)]
+    #[arg(long, default_value_t = 120.0, value_parser = seconds)]
     pub time: f64,
     /// Maximum duration of a call sequence in seconds; a longer one is a hang if it also exceeds three times this limit when it
     /// is repeated.
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 10.0, value_parser = seconds)]
     pub limit: f64,
     /// Megabytes of memory that the FMU may use.
     #[arg(long, default_value_t = 8192)]
@@ -59,7 +62,7 @@ pub struct Options {
     pub fail_on: FailOn,
     /// Seconds after which the repetitions that detect leaks end; if there are then too few for an evaluation, they may take four
     /// times as long.
-    #[arg(long, default_value_t = 1.5)]
+    #[arg(long, default_value_t = 1.5, value_parser = seconds)]
     pub repeat: f64,
     /// Does not shorten call sequences.
     #[arg(long)]
@@ -71,6 +74,14 @@ pub struct Options {
     /// is not a mistake.
     #[arg(skip)]
     pub is_build: bool,
+}
+
+/// Reads a duration in seconds.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if seconds > 0.0 && seconds <= LONGEST => Ok(seconds),
+        _ => Err(format!("write a number of seconds above 0 and up to {LONGEST}")),
+    }
 }
 
 impl Options {

@@ -32,7 +32,7 @@ pub struct ReplayOptions {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub times: usize,
     /// Maximum duration of an execution of the calls in seconds. The report may state a shorter one.
-    #[arg(long, default_value_t = 150.0)]
+    #[arg(long, default_value_t = 150.0, value_parser = crate::options::seconds)]
     pub limit: f64,
     /// Megabytes of memory that the FMU may use. The report may state fewer.
     #[arg(long, default_value_t = 8192)]

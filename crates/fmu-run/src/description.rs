@@ -467,7 +467,8 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         attributes: Arc::clone(&attributes),
     };
     if sizes.is_empty() {
-        let start = of.start.first().map(|start| Arc::from(&**start));
+        // A start value with blanks in it is no value, and reading a part of it would be a guess.
+        let start = (!of.start.is_empty()).then(|| Arc::from(of.start.join(" ")));
         return variables.push(variable(of.name.clone(), of.reference, start));
     }
     // Several arrays may have the same value reference, so the array is identified by its first element.

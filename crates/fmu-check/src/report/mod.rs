@@ -173,6 +173,7 @@ impl Report {
                     Proof::NotShown(why) | Proof::NotRun(why) => {
                         format!("; {length} calls, not reproduced ({why}), so only a note")
                     }
+                    Proof::Files | Proof::Shown if length == 1 => "; 1 call reproduces it".to_owned(),
                     Proof::Files | Proof::Shown => format!("; {length} calls reproduce it"),
                 },
             };
@@ -186,6 +187,9 @@ impl Report {
         for Unchecked { name, why, allowed } in &self.unreached {
             let allowed = if *allowed { " (allowed)" } else { "" };
             let _ = writeln!(text, "not checked{allowed}: {name}: {}", shown(why));
+        }
+        for name in &self.unused {
+            let _ = writeln!(text, "baseline: {} matches no finding of this check", shown(name));
         }
         let Self { sequences, seconds, seed, .. } = self;
         text + &format!("{sequences} call sequences, {seconds:.1} s, seed {seed}\n")

@@ -325,7 +325,13 @@ class Model:
                 raise ValueError(f"{name} has no start value; give one, as in start={{{name!r}: 1.0}}")
             if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str):
                 value = self.converted(name, *value)
-            array = numbers(name, float(value) if isinstance(value, str) else value)
+            try:
+                array = numbers(name, float(value) if isinstance(value, str) else value)
+            except ValueError as error:
+                if isinstance(value, str):
+                    why = f"the start value of {name} in the FMU is {value!r}, not a number; give one in start"
+                    raise ValueError(why) from error
+                raise
             if array.ndim != 0:
                 raise ValueError(f"start: {name} has the shape {array.shape}; sensitivities need one value")
             values[name] = float(array)

@@ -152,6 +152,11 @@ fn with_times<'py>(
     if !is_sequence(&times) || !has_unit && !is_sequence(&values) {
         return none();
     }
+    if has_unit && !tuple.get_item(2)?.is_instance_of::<PyString>() {
+        return Err(PyValueError::new_err(format!(
+            "{name} is a tuple of three, (times, values, unit), but its unit is no string; for three runs, write a list"
+        )));
+    }
     let times = Numbers::of(&format!("the times of {name}"), &times)?;
     if times.shape().len() != 1 {
         return Err(PyValueError::new_err(format!(

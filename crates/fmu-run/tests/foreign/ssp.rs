@@ -122,8 +122,10 @@ fn outer_values_take_precedence() {
         binding("", &[("gain", REAL[0]), ("on", "Boolean value=\"1\""), ("label", "String value=\"x\"")], "");
     let of = |inner: &[(&str, &str)], outer: &[(&str, &str)]| {
         let nested = binding("", inner, "") + &elements(&component("a", &own));
-        let system =
-            binding("", outer, "") + &elements(&format!("<ssd:System name=\"n\">{nested}</ssd:System>"));
+        // Each value has its own binding.
+        let outer: String = outer.iter().map(|one| binding("", &[*one], "")).collect();
+        let outer = outer.replace("</ssd:ParameterBindings><ssd:ParameterBindings>", "");
+        let system = outer + &elements(&format!("<ssd:System name=\"n\">{nested}</ssd:System>"));
         let directory = written(&system, "", &[]);
         values(&opened(directory.path(), Order::Dependencies).unwrap(), &["n.a.gain", "n.a.on"])
     };
@@ -497,8 +499,47 @@ fn wrong_structures_are_errors() {
             "component a is not an FMU but application/x-ssp-definition, which cannot be run",
         ),
         (component("a", "").replace("name=\"a\"", ""), "a Component lacks name"),
+        (
+            source("source=\"m\" implementation=\"ModelExchange\""),
+            "component a asks for ModelExchange (implementation), and systems run Co-Simulation only",
+        ),
+        (
+            component("a", &connectors(&[("u", "Input", "")])),
+            "the connector a.u is of the unknown kind Input",
+        ),
     ] {
         let found = of(&elements(&system), &[]);
+        assert!(found.contains(why), "{found}");
+    }
+    for (value, why) in [
+        (
+            "Real value=\"60\" units=\"deg\"",
+            "gain: a Real has the unknown attribute units; there are value, unit",
+        ),
+        ("Integer value=\"1.5\"", "the value of a.gain is \"1.5\", not an integer"),
+        ("Float value=\"1\"", "gain is a Float; there are Real, Integer"),
+        ("Real value=\"1\"/><ssv:Real value=\"2\"", "gain has several values"),
+        (
+            "Real value=\"1\"/></ssv:Parameter><ssv:Parameter name=\"gain\"><ssv:Real value=\"2\"",
+            "a parameter set has gain twice",
+        ),
+    ] {
+        let found = of(&elements(&component("a", &binding("", &[("gain", value)], ""))), &[]);
+        assert!(found.contains(why), "{found}");
+    }
+    for (content, why) in [
+        (
+            "<ssc:Lineartransformation factor=\"2\"/>",
+            "has the transformation Lineartransformation, which is unknown",
+        ),
+        (
+            "<ssc:LinearTransformation factr=\"2\"/>",
+            "a LinearTransformation has the unknown attribute factr; there are factor",
+        ),
+    ] {
+        let system = elements(&(component("a", "") + &component("b", "")))
+            + &connections(&[connection("a.y", "b.u", content)]);
+        let found = of(&system, &[]);
         assert!(found.contains(why), "{found}");
     }
     let found = of("", &[("SystemStructure.ssd", "<a")]);
@@ -526,7 +567,13 @@ fn wrong_mappings_and_annotations() {
     // Nothing is read from annotations, so a prefix in them need not be declared.
     let annotation = "<ssd:Annotations><ssc:Annotation type=\"osp\"><osp:Simulation osp:x=\"1\"><other:y/></osp:Simulation></ssc:Annotation></ssd:Annotations>";
     let system = elements(&component("a", "")) + annotation;
-    opened(written(&system, "", &[]).path(), Order::Jacobi).unwrap();
+    let directory = written(&system, "", &[]);
+    opened(directory.path(), Order::Jacobi).unwrap();
+    let file = directory.path().join("SystemStructure.ssd");
+    let text = std::fs::read_to_string(&file).unwrap().replace("version=\"1.0\"", "version=\"2.0\"");
+    std::fs::write(&file, text).unwrap();
+    let system = opened(directory.path(), Order::Jacobi).unwrap();
+    assert_eq!(system.warnings(), ["SystemStructure.ssd is of version 2.0 and is read as SSP 1.0"]);
 }
 
 /// libcosim takes the output from the causalities, so the two variables of a connection have any order.

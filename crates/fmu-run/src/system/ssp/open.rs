@@ -45,6 +45,9 @@ impl System {
         let is_archive = matches!(directory, Files::Temporary(_));
         let mut read =
             Read::of(path, Base { directory: directory.path(), is_archive }, root).map_err(fail)?;
+        if let Some(other) = root.attribute("version").filter(|version| *version != "1.0") {
+            read.warn(|| format!("{STRUCTURE} is of version {} and is read as SSP 1.0", shown(other)));
+        }
         read.outer_system(system).map_err(fail)?;
 
         let names =

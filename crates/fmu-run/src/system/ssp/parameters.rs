@@ -1,6 +1,6 @@
 //! Start values of a system: parameter sets and the mappings of their names and values (sections 5.2.3, 6 and 7 of SSP 1.0).
 
-use super::read::{Binding, Place, Read, Transformation, child, children, needed, units};
+use super::read::{Binding, Place, Read, Transformation, child, children, needed, only_attributes, units};
 use super::routes::{Link, NamedUnit, Routes};
 use super::source::Base;
 use crate::change::Change;
@@ -144,6 +144,9 @@ impl<'t> Target<'t> {
 const VALUES: &str = "application/x-ssp-parameter-set";
 const MAPPING: &str = "application/x-ssp-parameter-mapping";
 
+/// Types of values (section 6.3 of SSP 1.0).
+const TYPES: [&str; 6] = ["Real", "Integer", "Boolean", "String", "Enumeration", "Binary"];
+
 impl Read<'_> {
     /// Returns the file to which an element refers, and its name; `None` if the element has the content itself. `directory` is the
     /// component's.
@@ -209,12 +212,25 @@ impl Read<'_> {
 
     fn parameters(&self, set: Node, prefix: &str) -> Result<Vec<(String, Parameter)>, String> {
         let units = units(set)?;
-        let mut found = Vec::new();
+        let (mut found, mut names) = (Vec::new(), HashSet::new());
         for parameter in children(set, "Parameters") {
             let name = format!("{prefix}{}", needed(parameter, "name")?);
-            let value = parameter.children().find(Node::is_element);
+            if !names.insert(name.clone()) {
+                return Err(format!("a parameter set has {} twice", shown(&name)));
+            }
             let no_value = || format!("{} has no value", shown(&name));
-            let value = value.ok_or_else(no_value)?;
+            let is_value = |node: &Node| node.is_element() && node.tag_name().name() != "Annotations";
+            let mut values = parameter.children().filter(is_value);
+            let value = values.next().ok_or_else(no_value)?;
+            if values.next().is_some() {
+                return Err(format!("{} has several values", shown(&name)));
+            }
+            if !TYPES.contains(&value.tag_name().name()) {
+                let other = shown(value.tag_name().name());
+                return Err(format!("{} is a {other}; there are {}", shown(&name), TYPES.join(", ")));
+            }
+            only_attributes(value, &["value", "unit", "name", "mime-type"])
+                .map_err(|why| format!("{}: {why}", shown(&name)))?;
             let text = value.attribute("value").or_else(|| value.attribute("name")).ok_or_else(no_value)?;
             let unit = value
                 .attribute("unit")
@@ -272,14 +288,14 @@ impl Parameter {
         warn: &dyn Fn(String),
     ) -> Result<Value, Error> {
         let transformation = entry.and_then(|entry| entry.transformation.as_ref());
+        let wrong = |what: &str| {
+            let (name, text) = (shown(name), shown(&self.text));
+            Error::Request(format!("the value of {name} is {text:?}, not {what}"))
+        };
+        let text = self.text.trim();
         let number = match self.kind.as_str() {
-            "Real" | "Integer" => Some(self.text.trim().parse::<f64>().map_err(|_| {
-                Error::Request(format!(
-                    "the value of {} is {:?}, not a number",
-                    shown(name),
-                    shown(&self.text)
-                ))
-            })?),
+            "Real" => Some(text.parse().map_err(|_| wrong("a number"))?),
+            "Integer" => Some(text.parse::<i32>().map(f64::from).map_err(|_| wrong("an integer"))?),
             "Boolean" => boolean(&self.text).map(|value| f64::from(u8::from(value))),
             _ => None,
         };

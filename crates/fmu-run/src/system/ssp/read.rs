@@ -18,6 +18,19 @@ use std::path::{Path, PathBuf};
 /// memory or time.
 const MOST: usize = 128 << 20;
 
+/// Kinds of connectors (section 4.3.1 of SSP 1.0 and 2.0); empty if the file does not state it.
+const KINDS: [&str; 9] = [
+    "",
+    "input",
+    "output",
+    "inout",
+    "parameter",
+    "calculatedParameter",
+    "structuralParameter",
+    "constant",
+    "local",
+];
+
 /// Maximum number of warnings.
 const WARNINGS: usize = 100;
 
@@ -204,6 +217,10 @@ impl<'r> Read<'r> {
         for connector in children(node, "Connectors") {
             let place = (element, needed(connector, "name")?);
             let kind = connector.attribute("kind").unwrap_or_default();
+            if !KINDS.contains(&kind) {
+                let name = self.name_of(place);
+                return Err(format!("the connector {} is of the unknown kind {}", shown(&name), shown(kind)));
+            }
             let of_type = |name: &str, attribute| {
                 let of_type = connector.children().find(|of| of.tag_name().name() == name);
                 of_type.and_then(|of| of.attribute(attribute))
@@ -227,6 +244,14 @@ impl<'r> Read<'r> {
                 "component {} is not an FMU but {}, which cannot be run",
                 name(),
                 shown(kind)
+            ));
+        }
+        let interface = element.attribute("implementation").unwrap_or("any");
+        if !matches!(interface, "any" | "CoSimulation") {
+            return Err(format!(
+                "component {} asks for {} (implementation), and systems run Co-Simulation only",
+                name(),
+                shown(interface)
             ));
         }
         let file = self.base.find(source).map_err(|why| format!("component {}: {why}", name()))?;
@@ -296,10 +321,12 @@ impl<'r> Read<'r> {
 impl Transformation {
     /// Reads the transformation of a connection or of an entry of a mapping, if there is one.
     pub fn of(node: Node) -> Result<Option<Self>, String> {
-        let is_transformation = |node: &Node| node.tag_name().name().ends_with("Transformation");
+        let others = ["ConnectionGeometry", "Annotations"];
+        let is_transformation = |node: &Node| node.is_element() && !others.contains(&node.tag_name().name());
         let Some(node) = node.children().find(is_transformation) else { return Ok(None) };
         let kind = node.tag_name().name();
         if kind == "LinearTransformation" {
+            only_attributes(node, &["factor", "offset"])?;
             let (factor, offset) = (attribute(node, "factor")?, attribute(node, "offset")?);
             return Ok(Some(Self::Change(Change::linear(factor.unwrap_or(1.0), offset.unwrap_or(0.0)))));
         }
@@ -372,6 +399,20 @@ pub(in crate::system) fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Nod
 
 pub(in crate::system) fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
+}
+
+/// Fails if an element has other attributes than these and those of every element (section 4.1 of SSP 1.0): a misspelt one would be ignored.
+pub(in crate::system) fn only_attributes(node: Node, known: &[&str]) -> Result<(), String> {
+    let is_known = |name: &str| known.contains(&name) || matches!(name, "id" | "description");
+    match node.attributes().find(|of| of.namespace().is_none() && !is_known(of.name())) {
+        Some(other) => Err(format!(
+            "a {} has the unknown attribute {}; there are {}",
+            shown(node.tag_name().name()),
+            shown(other.name()),
+            known.join(", ")
+        )),
+        None => Ok(()),
+    }
 }
 
 pub(in crate::system) fn needed<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
