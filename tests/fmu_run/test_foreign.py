@@ -384,7 +384,10 @@ def test_inputs_with_their_own_times(made):
         (([1.0, 0.0], [1.0, 2.0]), "the times of u decrease: 0 follows 1"),
         (([[0.0], [1.0]], [1.0, 2.0]), "the times of u have the shape (2, 1)"),
         (([0.0, 1.0], [1.0, 2.0], "deg"), "u has no unit"),
-        (([0.0, 1.0], [1.0, 2.0], [3.0, 4.0]), "u is a tuple of three, (times, values, unit), but its unit is no string"),
+        (
+            ([0.0, 1.0], [1.0, 2.0], [3.0, 4.0]),
+            "u is a tuple of three, (times, values, unit), but its unit is no string",
+        ),
     ]:
         with pytest.raises(ValueError, match=re.escape(why)):
             fmu.run(TIME, inputs={"u": value}, outputs=["u"])

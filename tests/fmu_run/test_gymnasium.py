@@ -324,7 +324,7 @@ def test_inputs_from_actions(task) -> None:
         ({"observations": ("yaw",)}, "yaw"),
         ({"observations": ()}, "observations: name at least one"),
         ({"actions": {"theta1": (1, -1)}}, "theta1 needs"),
-        ({"length": 0}, "length must be at least 1"),
+        ({"length": 0}, "length must be an integer of at least 1"),
         ({"failed_reward": np.nan}, "failed_reward must be a finite number"),
         ({"step": 0.0}, "step above 0"),
         ({"inputs": MOTORS}, "inputs and to_inputs, or neither"),
@@ -336,6 +336,9 @@ def test_inputs_from_actions(task) -> None:
         ({"delays": {"roll": 1.5}}, "delays: roll needs an integer of at least 0, not 1.5"),
         ({"goals": {"roll": (0.0, 1.0)}}, "goals: roll is an observation; choose another name"),
         ({"drawn": {"k1": (2.0, 1.0)}}, "drawn: k1 needs .low, high., low not above high, or a function, not"),
+        ({"drawn": {"k1": 100.0}}, "drawn: k1 needs .low, high., .* not 100"),
+        ({"start": {"k1": 100.0}, "drawn": {"k1": (100.0, 120.0)}}, "drawn: k1 also has a value in start"),
+        ({"length": 2.5}, "length must be an integer of at least 1"),
     ],
 )
 def test_invalid_tasks(task, changed, message) -> None:
@@ -355,6 +358,10 @@ def test_invalid_results_of_functions(task) -> None:
             envs.step(np.zeros(2))
         with pytest.raises(ValueError, match=r"reset_mask must be \(2,\) of bool"):
             envs.reset(options={"reset_mask": [1, 0]})
+    envs = VectorEnv(replace(task, reward=lambda before, action, after: np.array([0.0, np.nan])), 2)
+    envs.reset()
+    with pytest.raises(ValueError, match="reward must return finite numbers, it returned nan in instance 1"):
+        envs.step(np.zeros((2, 2)))
     for count in (1, 2):
         drawn = iter(np.linspace(100, -1, count + 1)[1:])
         envs = VectorEnv(replace(task, drawn={"k1": lambda rng, drawn=drawn: next(drawn)}), count)

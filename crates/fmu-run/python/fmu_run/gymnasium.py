@@ -135,8 +135,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     _own: fmu_run.Fmu | fmu_run.System | None = None
 
     def __init__(self, task: Task, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP):
-        if task.length < 1 or not task.step > 0:
-            raise ValueError(f"length must be at least 1 and step above 0, they are {task.length} and {task.step}")
+        if not isinstance(task.length, int | np.integer) or task.length < 1 or not task.step > 0:
+            raise ValueError(
+                f"length must be an integer of at least 1 and step above 0, they are {task.length} and {task.step}"
+            )
         if not np.isfinite(task.failed_reward):
             raise ValueError(f"failed_reward must be a finite number, it is {task.failed_reward}")
         if (task.inputs is None) != (task.to_inputs is None):
@@ -241,6 +243,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         self.steps += 1
         rewards = self._judged("reward", self.task.reward(before, acting, after)).astype(np.float64)
         rewards[list(errors)] = self.task.failed_reward
+        if (unknown := np.flatnonzero(~np.isfinite(rewards) & ~renew)).size:
+            raise ValueError(
+                f"reward must return finite numbers, it returned {rewards[unknown[0]]} in instance {unknown[0]}"
+            )
         ends = self.task.terminated
         terminated = np.zeros(self.num_envs, dtype=bool)
         if ends is not None:
@@ -432,9 +438,12 @@ def _check_sensors(task: Task, actions: Mapping[str, Any], observations: Mapping
     for name in task.goals:
         if name in observations:
             raise ValueError(f"goals: {name} is an observation; choose another name")
+    if twice := [name for name in task.drawn if name in task.start]:
+        raise ValueError(f"drawn: {twice[0]} also has a value in start; give one of both")
     for what, draws in (("drawn", task.drawn), ("goals", task.goals)):
         for name, how in draws.items():
-            if not callable(how) and not (np.isfinite(how).all() and len(how) == 2 and how[0] <= how[1]):
+            pair = None if callable(how) else np.asarray(how, dtype=float)
+            if pair is not None and not (pair.shape == (2,) and np.isfinite(pair).all() and pair[0] <= pair[1]):
                 raise ValueError(f"{what}: {name} needs (low, high), low not above high, or a function, not {how}")
     for name, deviation in task.noise.items():
         if not (np.isfinite(deviation) and deviation >= 0):
