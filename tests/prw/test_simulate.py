@@ -136,13 +136,23 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
         ),
         ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
         ([1.0], "--parameters: mine.json is not a JSON file with values by name"),
+        (
+            {"k1": {"value": 1.0, "units": "N.m/deg"}},
+            "mine.json: k1 has the member 'units'; write value, unit, meaning",
+        ),
+        ({"k1": True}, "mine.json: k1 is True, not a number"),
+        ('{"k1": 1.0, "k1": 2.0}', "mine.json: k1 is given twice"),
+        ({"parameters": {"k1": 1.0}, "k2": 2.0}, 'mine.json: k2 is outside of "parameters"; move it there'),
+        ({"fmu": {}, "parameters": {"k1": 1.0}, "k2": 2.0}, "mine.json: k2 is outside"),
+        ('{"k1": 1.0,\n"k2"}', "by name (Expecting ':' delimiter in line 2, column 5)"),
     ]:
-        (tmp_path / "mine.json").write_text(json.dumps(entry))
+        (tmp_path / "mine.json").write_text(entry if isinstance(entry, str) else json.dumps(entry))
         result = prw("simulate", "--parameters", "mine.json")
         assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
     for arguments, message in [
         (["--set", "k9=1"], "--set: k9 is not known; there are J2"),
         (["--set", "k1=stiff"], "--set k1=stiff: 'stiff' is not a number"),
+        (["--set", "k1=true"], "--set: k1 is True, not a number"),
         (["--parameters", "absent.json"], "--parameters: absent.json cannot be read (No such file"),
         (["good.csv", "--input", "good.csv"], "give one recording"),
     ]:

@@ -19,6 +19,8 @@ from prw.files import read_text
 
 #: A larger relative standard deviation is probably a mistake: percent instead of a fraction.
 MAX_RELATIVE = 1.0
+#: Members of a parameter in a file, as `build_fmu` reads them.
+ENTRY = ("value", "unit", "meaning")
 #: A table in memory, with columns by name.
 Table = Mapping[str, Any]
 
@@ -143,45 +145,75 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
             argument="parameters",
         )
     path = Path(given)
+    why, content = "", None
     try:
-        content = json.loads(read_text(path))
-        # report.json contains the parameters among other things.
-        entries = dict(content["parameters"] if isinstance(content.get("parameters"), dict) else content)
+        content = json.loads(read_text(path), object_pairs_hook=_without_repetitions)
     except OSError as error:
         raise UserError(f"{path} cannot be read ({error.strerror or error})", argument="parameters") from None
-    except (ValueError, AttributeError, RecursionError):
-        raise UserError(
-            f"{path} is not a JSON file with values by name; if it is an FMU, pass it as `fmu`", argument="parameters"
-        ) from None
-    return {name: _value(path, name, entry, loaded) for name, entry in entries.items()}
+    except UserError as error:
+        raise UserError(f"{path}: {error}", argument="parameters") from None
+    except json.JSONDecodeError as error:
+        why = f" ({error.msg} in line {error.lineno}, column {error.colno})"
+    except UnicodeError:
+        why = "; if it is an FMU, pass it as `fmu` (--fmu)"
+    except (ValueError, RecursionError):
+        pass
+    if not isinstance(content, dict):
+        raise UserError(f"{path} is not a JSON file with values by name{why}", argument="parameters")
+    inner = content.get("parameters")
+    if not isinstance(inner, dict):
+        return {name: _value(path, name, entry, loaded, False) for name, entry in content.items()}
+    # report.json contains the FMU, the parameters and other things.
+    report = "fmu" in content
+    for name in content:
+        if name != "parameters" and (name in loaded.variables or not report):
+            raise UserError(f'{path}: {name} is outside of "parameters"; move it there', argument="parameters")
+    return {name: _value(path, name, entry, loaded, report) for name, entry in inner.items()}
 
 
-def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
+def _without_repetitions(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The members of a JSON object. Raises UserError if two have the same name."""
+    found = dict(members)
+    if len(found) < len(members):
+        names = [name for name, _ in members]
+        raise UserError(f"{next(name for name in names if names.count(name) > 1)} is given twice")
+    return found
+
+
+def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu, where: str = "") -> Any:
     """The value of a pair (value, unit), converted to the unit of the FMU's variable. Any other value, and the value of an unknown
-    variable, is returned unchanged. Raises UserError for a unit that cannot be converted."""
-    if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
+    variable, is returned unchanged. Raises UserError, with a message that begins with `where`, for a unit that cannot be converted,
+    or for a Boolean in place of a number."""
+    if name not in loaded.variables:
+        return value
+    pair = isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)
+    if isinstance(value[0] if pair else value, (bool, np.bool_)) and loaded.variables[name].type != "Boolean":
+        raise UserError(f"{where}{name} is {value!r}, not a number", argument="parameters")
+    if not pair:
         return value
     try:
         numbers = np.asarray(value[0], dtype=np.float64)
     except (TypeError, ValueError):
         numbers = np.array(np.nan)
     if not np.isfinite(numbers).all():
-        raise UserError(f"{name} is {value!r}; write finite numbers and their unit", argument="parameters")
+        raise UserError(f"{where}{name} is {value!r}; write finite numbers and their unit", argument="parameters")
     try:
         return loaded.converted(name, numbers if numbers.ndim else value[0], value[1])
     except ValueError as error:
-        raise UserError(str(error), argument="parameters") from None
+        raise UserError(f"{where}{error}", argument="parameters") from None
 
 
-def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu) -> float | int | bool:
+def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu, report: bool) -> Any:
     """An entry of the file, converted to the FMU's unit. The entry is a number in that unit, or a dict with a value and
-    its unit. Raises UserError for any other entry, or a unit that cannot be converted."""
+    its unit; in the report of an identification, it has further members. Raises UserError for any other entry, or a unit that
+    cannot be converted."""
     value, unit = (entry.get("value"), str(entry.get("unit", ""))) if isinstance(entry, dict) else (entry, "")
+    if isinstance(entry, dict) and not report:
+        for member in entry:
+            if member not in ENTRY:
+                raise UserError(
+                    f"{path}: {name} has the member {member!r}; write {', '.join(ENTRY)}", argument="parameters"
+                )
     if not isinstance(value, (int, float)):
         raise UserError(f"{path}: {name} is {value!r}, not a number", argument="parameters")
-    if unit in ("", "1") or name not in loaded.variables:
-        return value
-    try:
-        return loaded.converted(name, value, unit)  # type: ignore[return-value]
-    except ValueError as error:
-        raise UserError(f"{path}: {error}", argument="parameters") from None
+    return in_own_unit(name, value if unit in ("", "1") else (value, unit), loaded, f"{path}: ")
