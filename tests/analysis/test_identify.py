@@ -152,11 +152,19 @@ def _fixed(simulated) -> list:
         (["--bounds", "k1=5:2"], "--bounds: k1 from 5 to 2; the first must be below the second"),
         (["--bounds", "k1=1:2"], "k1 starts at 120.894, outside of its bounds 1 to 2"),
         (["--units", "torque=N.m"], "--units: torque is not known"),
-        (["--quantum", "1kg"], "theta1 cannot be in 'kg'"),
+        (
+            ["--quantum", "1kg"],
+            "--quantum 1kg: write an angle above 0 and its unit, as in 0.036deg; units are rad, mrad",
+        ),
+        (["--quantum", "0.036"], "--quantum 0.036: write an angle above 0 and its unit"),
+        (["--quantum", "0deg"], "--quantum 0deg: write an angle above 0 and its unit"),
+        (["run.csv"], "run.csv and run.csv (files 1 and 2) contain the same measurements, which would count twice"),
+        (["half.csv"], "run.csv and half.csv (files 1 and 2) contain the same measurements"),
     ],
 )
 def test_wrong_options(prw, tmp_path, experiment, arguments, message):
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 1, ("tau1",)), rows=slice(0, 200))
+    rig.write(tmp_path / "half.csv", rig.measure(experiment, 1, ("tau1",)), rows=slice(0, 100))
     result = prw("identify", "run.csv", *arguments)
     assert result.returncode == 1
     assert message in result.stderr and result.stderr.count("\n") == 1, result.stderr

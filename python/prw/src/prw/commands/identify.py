@@ -16,7 +16,7 @@ import argparse
 import re
 from pathlib import Path
 
-from prw.columns import factor
+from prw.columns import UNITS, factor
 from prw.commands.options import (
     Named,
     add_paths,
@@ -172,10 +172,14 @@ def run(arguments: argparse.Namespace) -> None:
 def _quantum(string: str | None) -> float:
     if string is None:
         return 0.0
-    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", string)
-    if not match:
-        raise UserError("write an angle like 0.036deg", argument="quantum", given=string)
+    match = re.fullmatch(r"\s*([-+.\deE]+)\s*(\D.*)", string)
     try:
-        return number(match[1]) * factor("theta1", match[2] or "rad")
-    except ValueError as error:
-        raise UserError(str(error), argument="quantum") from None
+        if match:
+            return number(match[1]) * factor("theta1", match[2])
+    except ValueError:
+        pass
+    raise UserError(
+        f"write an angle above 0 and its unit, as in 0.036deg; units are {', '.join(UNITS['angle'])}",
+        argument="quantum",
+        given=string,
+    )

@@ -22,9 +22,13 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
+import numpy as np
+
 from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, not_negative, positive, spread_of
+from prw.columns import ANGLES
 from prw.errors import UserError, need
 
 if TYPE_CHECKING:
@@ -160,7 +164,6 @@ def identify(
     """
     need("scipy", "threadpoolctl")
     # These imports are slow.
-    import numpy as np
     from threadpoolctl import threadpool_limits
 
     from prw.arguments import values_of
@@ -216,6 +219,7 @@ def identify(
             else read(each, units, degrees, **header)
             for each in several
         ]
+        _check_different(measured)
         channels = dict.fromkeys(name for m in measured for name in m.measured)
         for argument, named in (("noise", noise), *requested.items(), ("drift", drift), ("hum", hum)):
             check_names(argument, named, argument in KINDS and KINDS[argument].places or channels)
@@ -277,6 +281,21 @@ def identify(
         sources = tuple(str(each.source) for each in measured)
         judged = found, tuple(parts), tuple(hints), tuple(assumed), stopped
         return Identification(model.fmu, model.known, sources, tuple(used), found.solution, sure, *judged)
+
+
+def _check_different(measured: Sequence[Recording]) -> None:
+    """Raise UserError if a recording contains the rows of another one, which would count twice and narrow the intervals."""
+    for (i, one), (j, other) in combinations(enumerate(measured, 1), 2):
+        short, long = (one, other) if len(one.time) <= len(other.time) else (other, one)
+        _, at, rows = np.intersect1d(short.time, long.time, assume_unique=True, return_indices=True)
+        shared = [name for name in short.measured if name in long.measured]
+        if not shared or len(at) < len(short.time):
+            continue
+        if all(np.array_equal(short[name][at], long[name][rows], equal_nan=True) for name in (*ANGLES, *shared)):
+            raise UserError(
+                f"{one.source} and {other.source} (files {i} and {j}) contain the same measurements, which would count twice; "
+                "name each experiment once"
+            )
 
 
 def task_of(
