@@ -77,6 +77,10 @@ BAD = {
     "prose": (b"Dear reader, this\n", "row 1: this is not a table of motor angles"),
     "nul": (b"time,theta1,theta2\n0,1,1\n1,\0,1\n", "row 3"),
     "decimal comma": (b"time\ttheta1\ttheta2\n0\t1\t1\n0,1\t1\t1\n", "row 3, column time: '0,1' is not a number"),
+    "separators of thousands": (
+        b"time;theta1;theta2;tau1\n0;0.1;0.1;1\n0.1;0.1;0.1;\n0.2;0.1;0.1;1,542\n",
+        "row 4: decimal commas and decimal points are mixed from here on",
+    ),
     "wrong unit of torque": (
         b"time,theta1,theta2,tau1 [deg]\n0,1,1,1\n1,1,1,1\n",
         "column tau1: tau1 cannot be in 'deg'; use N.m, mN.m",

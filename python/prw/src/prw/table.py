@@ -20,6 +20,8 @@ from prw.motion import Array
 from prw.progress import Progress
 
 DELIMITERS = (",", ";", "\t")
+#: Characters before decimals, of which a file has one.
+_MARKS = frozenset(".,")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
 #: Maximum number of characters of a line.
@@ -133,6 +135,7 @@ def _rows(
     """All rows below the header, (rows, columns). width: cells of the header. size: bytes of the file."""
     cells, previous, bytes_read, indices = array("d"), -math.inf, 0, [index for _, index in columns]
     comma = table.dialect.delimiter == ";"
+    marks: set[str] = set()
     with Progress(f"reading {path}", size) as progress:
         for count, row in enumerate(table):
             # Some tools end each row, but not the header, with a separator.
@@ -153,6 +156,11 @@ def _rows(
             if "_" in line or not math.isfinite(sum(values)):
                 where = _where(path, table.line_num)
                 values = [_number(f"{where}, column {n}", row[i], comma, n in may_be_empty) for n, i in columns]
+            if comma and len(marks := marks.union(*(_MARKS.intersection(row[i]) for i in indices))) > 1:
+                raise UserError(
+                    f"{_where(path, table.line_num)}: decimal commas and decimal points are mixed from here on; write all numbers "
+                    "with the same, and without separators of thousands"
+                )
             if increasing and values[0] <= previous:
                 message = "repeats the time of the previous row" if values[0] == previous else "runs backwards"
                 raise UserError(
