@@ -94,6 +94,8 @@ def test_either_version_of_fmi(recording, fmu, found):
         ({"parameters": {"c3": 0}, "priors": {"c3": 0.1}}, "priors: c3 starts at 0; write (value, fraction)"),
         ({"starts": 0}, "starts 0: must be an integer of at least 1"),
         ({"starts": None}, "starts None: must be an integer of at least 1"),
+        ({"seed": -1}, "seed -1: must be an integer of at least 0"),
+        ({"follow": -1}, "follow -1: must be an integer of at least 0"),
         ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
     ],
 )

@@ -152,6 +152,7 @@ def _fixed(simulated) -> list:
         (["--bounds", "k1=5:2"], "--bounds: k1 from 5 to 2; the first must be below the second"),
         (["--bounds", "k1=1:2"], "k1 starts at 120.894, outside of its bounds 1 to 2"),
         (["--units", "torque=N.m"], "--units: torque is not known"),
+        (["half.csv", "--units", "roll=deg"], "run.csv, half.csv: no column roll, whose unit is given; there are time"),
         (
             ["--quantum", "1kg"],
             "--quantum 1kg: write an angle above 0 and its unit, as in 0.036deg; units are rad, mrad",

@@ -232,6 +232,10 @@ def test_headers_of_other_tools(tmp_path: Path) -> None:
         read(path, names={**names, "roll": "Mot"}, skip=2)
     with pytest.raises(UserError, match="names: .* names one column twice"):
         read(path, names={**names, "roll": "T"}, skip=2)
+    with pytest.raises(UserError, match="recording: no column roll, whose unit is given; there are time, theta1"):
+        read({"time": [0, 1], "theta1": [0, 0], "theta2": [0, 0]}, units={"roll": "deg"})
+    with pytest.raises(UserError, match="skip 1.5: must be an integer of at least 0"):
+        read(path, skip=1.5)  # type: ignore[arg-type]
     with pytest.raises(UserError, match="names: tau3 is not known"):
         read(path, names={"tau3": "X"})
     with pytest.raises(UserError, match="encoding: 'utf-7000' is not known"):

@@ -212,6 +212,15 @@ def test_other_errors(prw: Any, tmp_path: Path) -> None:
         (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU\n"),
         (["--input", "good.csv", "--fmu", "no.fmu"], "no.fmu: cannot be loaded"),
         (["--radians"], "--degrees and --radians belong to a recording"),
+        (["--units", "theta1=deg"], "--units: belongs to a recording; name its file"),
+        (["--names", "theta1=Foo"], "--names: belongs to a recording"),
+        (["--skip-lines", "3"], "--skip-lines: belongs to a recording"),
+        (["--encoding", "foo"], "--encoding: belongs to a recording"),
+        (["good.csv", "--skip-lines", "-1"], "--skip-lines -1: must be an integer of at least 0"),
+        (
+            ["good.csv", "--units", "omega1=rpm"],
+            "good.csv: no column omega1, whose unit is given; there are time, theta1",
+        ),
     ]:
         result = prw("simulate", *arguments, with_fmu=False)
         assert result.returncode == 1 and message in result.stderr, result.stderr

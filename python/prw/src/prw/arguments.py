@@ -41,10 +41,10 @@ def check_names(argument: str, names: Iterable[str], known: Collection[str], oth
             raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=argument)
 
 
-def counted(argument: str, value: Any) -> int:
-    """The value as an int. Raises UserError unless it is an integer of at least 1."""
-    if not isinstance(value, Integral) or value < 1:
-        raise UserError("must be an integer of at least 1", argument=argument, given=repr(value))
+def counted(argument: str, value: Any, least: int = 1) -> int:
+    """The value as an int. Raises UserError unless it is an integer of at least `least`."""
+    if not isinstance(value, Integral) or value < least:
+        raise UserError(f"must be an integer of at least {least}", argument=argument, given=repr(value))
     return int(value)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from prw.arguments import Table, check_names, columns_of, is_path, is_table, numbers_of
+from prw.arguments import Table, check_names, columns_of, counted, is_path, is_table, numbers_of
 from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion, unwrapped
@@ -103,7 +103,7 @@ def read(
     path
         The file or table.
     units
-        Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. If an encoder has 10000
+        Unit by column of the file, if the header has none (`pitch [deg]` has one). Default: SI. If an encoder has 10000
         counts per revolution, the unit of its counts is `rev/10000`.
     degrees
         Whether columns without a unit are in degrees and degrees per second, or in rad and rad/s. By default they are in rad
@@ -120,7 +120,9 @@ def read(
     UserError
         The recording cannot be read; the message names file, row and column.
     """
-    return _read(path, units, degrees, tuple(MEASURED), names, skip, encoding)
+    found = read_columns(path, units, degrees, tuple(MEASURED), names, skip, encoding)
+    check_units(units, [found])
+    return found
 
 
 def read_motion(
@@ -133,10 +135,19 @@ def read_motion(
     encoding: str = "",
 ) -> Motion:
     """Read only the motors' motion, as `read` does; other columns are ignored."""
-    return _read(path, units, degrees, (), names, skip, encoding).motion
+    return read_columns(path, units, degrees, (), names, skip, encoding).motion
 
 
-def _read(
+def check_units(units: Mapping[str, str] | None, recordings: Sequence[Recording]) -> None:
+    """Raise UserError if a column with a unit in `units` is in none of the recordings."""
+    for name in units or {}:
+        if not any(name in each.units for each in recordings):
+            files = ", ".join(str(each.source) for each in recordings)
+            there = dict.fromkeys(name for each in recordings for name in each.units)
+            raise UserError(f"{files}: no column {name}, whose unit is given; there are {', '.join(there)}")
+
+
+def read_columns(
     source: str | os.PathLike[str] | Table,
     units: Mapping[str, str] | None,
     degrees: bool | None,
@@ -145,6 +156,7 @@ def _read(
     skip: int,
     encoding: str,
 ) -> Recording:
+    """Read the motion and the columns `measured`, as `read` does; `units` may have names of other columns."""
     if not is_path(source) and not is_table(source):
         raise UserError(f"{source!r} is not a recording: neither a file nor a DataFrame or a dict of arrays")
     path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
@@ -153,16 +165,16 @@ def _read(
     called = {header: name for name, header in names.items()}
     if len(called) < len(names):
         raise UserError(f"{names!r} names one column twice", argument="names")
-    if skip < 0:
-        raise UserError("it must be 0 or more lines", argument="skip", given=skip)
+    counted("skip", skip, 0)
 
     found = Columns([], {}, set(), [])
 
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
+        where = f"{path}, row {line}" if line else str(path)
         for name in called:
             if not any(_is_called(title, name) for title in header):
-                raise UserError(f"{path}, row {line}: no column {name!r}; the header has {shown(header)}")
+                raise UserError(f"{where}: no column {name!r}; the header has {shown(header)}")
         found = columns(path, [_renamed(title, called) for title in header], line, measured, units, degrees)
         return found.taken
 

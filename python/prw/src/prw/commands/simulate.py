@@ -81,6 +81,9 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         if arguments.degrees is not None:
             raise UserError("--degrees and --radians belong to a recording; the paper's experiment is in radians")
+        for name in ("units", "names", "skip", "encoding"):
+            if getattr(arguments, name):
+                raise UserError("belongs to a recording; name its file, or omit this", argument=name)
         motion, title = fig4(), "Fig. 4: opposite motor velocities"
     table, figure_path = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
     if recorded and table.exists() and table.samefile(arguments.input):

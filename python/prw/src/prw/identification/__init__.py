@@ -23,12 +23,12 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
 from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, not_negative, positive, spread_of
-from prw.columns import ANGLES
+from prw.columns import ANGLES, CHANNELS
 from prw.errors import UserError, need
 
 if TYPE_CHECKING:
@@ -178,11 +178,10 @@ def identify(
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
-    from prw.recording import Recording, read
+    from prw.recording import Recording, check_units, read_columns
     from prw.simulation import Run
 
-    starts, follow = counted("starts", starts), counted("follow", follow) if follow else 0
-    header: Any = {"names": names, "skip": skip, "encoding": encoding}
+    starts, seed, follow = counted("starts", starts), counted("seed", seed, 0), counted("follow", follow, 0)
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
@@ -216,9 +215,10 @@ def identify(
             if isinstance(each, Run)
             else each
             if isinstance(each, Recording)
-            else read(each, units, degrees, **header)
+            else read_columns(each, units, degrees, CHANNELS, names, skip, encoding)
             for each in several
         ]
+        check_units(units, measured)
         _check_different(measured)
         channels = dict.fromkeys(name for m in measured for name in m.measured)
         for argument, named in (("noise", noise), *requested.items(), ("drift", drift), ("hum", hum)):
