@@ -89,7 +89,7 @@ def test_either_version_of_fmi(recording, fmu, found):
         ({"noise": {"tau1": None}}, "noise: tau1 None is not a finite number above 0"),
         (
             {"parameters": {"c3": 0}, "estimate": "c3"},
-            "c3 starts at 0, from where it cannot be estimated; pass priors={'c3'",
+            "c3 starts at 0, from where it cannot be estimated; give it another start value, bounds, or a prior",
         ),
         ({"parameters": {"c3": 0}, "priors": {"c3": 0.1}}, "priors: c3 starts at 0; write (value, fraction)"),
         ({"starts": 0}, "starts 0: must be an integer of at least 1"),

@@ -333,6 +333,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
     assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
     for wrong, message in (
         ("k1", "--set k1: write NAME=VALUE"),
+        ("k2=1,k1=1,5", "--set k2=1,k1=1,5: write NAME=VALUE; a comma begins the next one, so decimals need a point"),
         ("k1=stiff", "--set k1=stiff: 'stiff' is not a number"),
     ):
         result = command("--set", wrong)

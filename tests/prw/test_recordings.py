@@ -73,6 +73,10 @@ BAD = {
         "time,theta1,ö\n0,1,1\n".encode("utf-16-le"),
         "this is not a text file, or it is UTF-16 without its byte order mark",
     ),
+    "utf-16 without its mark, in which each byte is UTF-8": (
+        "# log\ntime,theta1,theta2\n0,1,1\n".encode("utf-16-le"),
+        "or it is UTF-16 without its byte order mark; save it as UTF-8 CSV, or name its encoding, such as latin-1",
+    ),
     "a picture": (b"GIF89a\xd2\0\xff", "this is not a text file"),
     "prose": (b"Dear reader, this\n", "row 1: this is not a table of motor angles"),
     "nul": (b"time,theta1,theta2\n0,1,1\n1,\0,1\n", "row 3"),
@@ -250,7 +254,9 @@ def test_degrees(file: Any) -> None:
     np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
     assert motion.notes == []
     # Without a unit, an implausible motion is rejected, because nobody knows whether it is in degrees or in radians.
-    with pytest.raises(UserError, match=r"theta1 reaches 43 rad .* add --degrees or --radians"):
+    with pytest.raises(
+        UserError, match=r"theta1 reaches 43 rad .* --radians \(in Python prw\.read\(path, degrees=True"
+    ):
         read_motion(path)
     assert any("theta1 reaches 43 rad" in note for note in read_motion(path, degrees=False).notes)
 

@@ -69,7 +69,9 @@ def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float
         raise UserError(f"{name} {given!r}: write a fraction as in 0.1, or (value, fraction)", argument=argument)
     value, relative = given if isinstance(given, Sequence) else (start, given)
     if value is start and start == 0:
-        raise UserError(f"{name} starts at 0; write (value, fraction)", argument=argument)
+        raise UserError(
+            f"{name} starts at 0; write (value, fraction), as an option NAME=VALUE:PERCENT%", argument=argument
+        )
     value, relative = positive(argument, value, name), positive(argument, relative, name)
     if relative > MAX_RELATIVE:
         raise UserError(

@@ -79,7 +79,7 @@ def notes_on_values(path: Path, time: Array, theta: Array, omega: Array | None, 
         if name in columns.assumed and (reach > PLAUSIBLE_ANGLE or not (len(steps) and steps.max() > JUMP)):
             raise UserError(
                 f"{path}: {name} {implausible} if it is in radians, but its header names no unit; add --degrees or --radians "
-                f"(in Python degrees=True or False), or call it {name} [deg] or {name} [rad]"
+                f"(in Python prw.read(path, degrees=True) or False), or call it {name} [deg] or {name} [rad]"
             )
         notes.append(f"{name} {implausible}; are these the right units?")
     if omega is None:

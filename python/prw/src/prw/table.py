@@ -26,6 +26,11 @@ _MARKS = frozenset(".,")
 REPORT_ROWS = 4096
 #: Maximum number of characters of a line.
 LONGEST_LINE = 1 << 20
+REMEDY = (
+    "save it as UTF-8 CSV, or name its encoding, such as latin-1 or utf-16-le, with --encoding (in Python "
+    "prw.read(path, encoding=...))"
+)
+NO_TEXT = f"this is not a text file, or it is UTF-16 without its byte order mark; {REMEDY}"
 
 #: Selects the columns to read, (name, index) each, from the header and the number of its line.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
@@ -52,14 +57,9 @@ def read_table(
             return _parse(path, file, choose, may_be_empty, increasing, skip)
     except UnicodeError:
         if not encoding and _is_binary(path):
-            raise UserError(
-                f"{path}: this is not a text file, or it is UTF-16 without its byte order mark; save it as UTF-8 CSV, or read it "
-                "with prw.read(path, encoding=...)"
-            ) from None
+            raise UserError(f"{path}: {NO_TEXT}") from None
         where = path if encoding else _where(path, _undecodable_line(path))
-        raise UserError(
-            f"{where}: not {encoding or 'UTF-8'} text; save it as UTF-8 CSV, or read it with prw.read(path, encoding=...)"
-        ) from None
+        raise UserError(f"{where}: not {encoding or 'UTF-8'} text; {REMEDY}") from None
     except LookupError:
         raise UserError(f"{encoding!r} is not known; try utf-16 or latin-1", argument="encoding") from None
     except OSError as error:
@@ -90,6 +90,8 @@ def _parse(
         top = next((row for row in table if row and table.line_num > begin), None)
         if top is None:
             raise UserError(f"{_where(path, table.line_num)}: there is no header")
+        if any("\0" in name for name in top):
+            raise UserError(f"{path}: {NO_TEXT}")
         header = [name.strip() for name in top]
         header[0] = header[0].lstrip("# ")
         columns = choose(header, table.line_num)

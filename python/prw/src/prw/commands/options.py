@@ -140,16 +140,18 @@ class Named(argparse.Action):
     ) -> None:
         """Add the pairs in the string `values`. Raises UserError naming the option."""
         option, found = str(option), dict(getattr(namespace, self.dest))
-        for part in filter(None, (part.strip() for part in values.split(","))):
-            name, _, string = (word.strip() for word in part.partition("="))
+        pairs = [[word.strip() for word in part.partition("=")] for part in values.split(",") if part.strip()]
+        for name, _, string in pairs:
             if not name or not string:
-                raise UserError("write NAME=VALUE", argument=option, given=part)
+                hint = "; a comma begins the next one, so decimals need a point" if "," in values else ""
+                raise UserError(f"write NAME=VALUE{hint}", argument=option, given=values)
+        for name, _, string in pairs:
             if name in found:
                 raise UserError(f"{name} is given twice", argument=option)
             try:
                 found[name] = self.read(string)
             except ValueError as error:
-                raise UserError(str(error), argument=option, given=part) from None
+                raise UserError(str(error), argument=option, given=f"{name}={string}") from None
         setattr(namespace, self.dest, found)
 
 

@@ -346,8 +346,7 @@ def task_of(
             start[name] = math.sqrt(bounds[name][0] * bounds[name][1])
         elif start[name] == 0:
             raise UserError(
-                f"{name} starts at 0, from where it cannot be estimated; pass priors={{{name!r}: (value, fraction)}}, bounds, "
-                "or another start value in parameters"
+                f"{name} starts at 0, from where it cannot be estimated; give it another start value, bounds, or a prior with a value"
             )
     spans = {**{name: (value / BOUNDS_FACTOR, value * BOUNDS_FACTOR) for name, value in start.items()}, **bounds}
     return Task(chosen, start, spans, beliefs, dict(noise), offsets, distortions, drift, dict(hum))
