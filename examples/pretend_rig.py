@@ -12,6 +12,7 @@ unknown offset. The errors differ from run to run, unless --noise selects them.
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.linalg import expm
 
 import prw
+from prw.arguments import check_names, counted, not_negative
 from prw.recording import read_motion
 from prw.testbed import Testbed
 
@@ -27,6 +29,7 @@ ENCODER = 360 / 10_000
 #: Number of FMU steps between two rows of the file. Motors move smoothly between the rows.
 STEPS = 20
 CHOSEN = ("k1", "k2", "c1", "c2", "c3")
+MEASURED = ("tau1", "tau2", "theta3", "theta4", "pitch", "roll")
 
 
 def smoothly(motion: prw.Motion) -> prw.Motion:
@@ -68,12 +71,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("motion", type=Path)
     parser.add_argument("run", type=Path)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--noise", type=int)
-    parser.add_argument("--measure", default="tau1,tau2,theta3,theta4,pitch,roll")
+    parser.add_argument("--seed", type=int, default=1, help="selects the parameters (default: %(default)s)")
+    parser.add_argument("--noise", type=int, help="seed that selects the errors of the sensors; it is not their size")
+    parser.add_argument("--measure", default=",".join(MEASURED), help="channels (default: %(default)s)")
     parser.add_argument("--friction", type=float, default=0.0, help="of each input shaft, N.m")
     parser.add_argument("--fmu", type=Path, help="the testbed FMU (default: the FMU that prw finds)")
     options = parser.parse_args()
+    counted("--seed", options.seed, 0)
+    counted("--noise", options.noise or 0, 0)
+    not_negative("--friction", options.friction)
+    check_names("--measure", options.measure.split(","), MEASURED)
     rig, sensors = np.random.default_rng(options.seed), np.random.default_rng(options.noise)
     motion = read_motion(options.motion)
     with Testbed(options.fmu) as testbed:
@@ -104,4 +111,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (prw.UserError, OSError) as error:
+        sys.exit(f"pretend_rig.py: {error}")

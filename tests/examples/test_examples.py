@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +164,22 @@ def test_identify_finds_the_parameters_of_the_simulated_rig(tmp_path: Path, caps
     for name in ("k1", "k2"):
         estimate = found.parameters[name]
         assert abs(estimate.value - float(truth[name])) < 4 * estimate.standard_error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nosuch.csv"], "nosuch.csv: cannot be read"),
+        (["m.csv", "--seed", "-1"], "--seed -1: must be an integer of at least 0"),
+        (["m.csv", "--noise", "-1"], "--noise -1: must be an integer of at least 0"),
+        (["m.csv", "--friction", "-1"], "--friction: -1.0 is not a finite number of at least 0"),
+        (["m.csv", "--measure", "yaw"], "--measure: yaw is not known"),
+    ],
+)
+def test_the_rig_rejects(arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["pretend_rig.py", arguments[0], "run.csv", *arguments[1:]])
+    with pytest.raises(SystemExit, match=f"^pretend_rig.py: {message}"):
+        runpy.run_path(str(ROOT / "examples" / "pretend_rig.py"), run_name="__main__")
 
 
 def test_each_gain_of_the_task_meets_the_same_episodes() -> None:
