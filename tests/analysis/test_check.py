@@ -216,6 +216,39 @@ def test_possible_causes(right, fmu, tmp_path, change, note):
 
 
 @pytest.mark.parametrize(
+    "change, reason",
+    [
+        (
+            lambda c: {n: np.append(v[:1], v[1:10] + 99 * (n == "roll")) for n, v in c.items()},
+            "it has only 0 to 0 s of 0 to 1 s",
+        ),
+        (lambda c: {n: v[:901] for n, v in c.items()}, "it has only 0 to 0.9 s of 0 to 1 s"),
+        (lambda c: {n: c[n] for n in ("time", "pitch")}, "no output that it has moves in this experiment; tau1, tau2,"),
+        (lambda c: {"rolll" if n == "roll" else n: v for n, v in c.items()}, "its column rolll is not known; name it"),
+        (lambda c: {n: v[1:-1] for n, v in c.items()}, ""),
+        (lambda c: {n: v[::2] for n, v in c.items() if n.startswith(("time", "th", "pitch", "roll"))}, ""),
+        (
+            lambda c: {n if n == "time" else f"a.{n}": v for n, v in {**c, "tau": c["tau1"]}.items() if n != "tau1"},
+            "tau",
+        ),
+        (lambda c: {"tau" if n == "tau1" else n if n == "time" else f"a.{n}": v for n, v in c.items()}, ""),
+    ],
+)
+def test_results_that_show_too_little(prw, right, tmp_path, change, reason):
+    """An incomplete result does not agree; one that lacks some outputs or the last time does, and the others are named."""
+    columns = change(right)
+    result = prw("check", write_csv(tmp_path / "run.csv", columns), "--experiment", "fig4_opposite")
+    assert "TOO FAR" not in result.stdout
+    if reason:
+        assert result.returncode == 1 and "agrees" not in result.stdout and reason in result.stderr
+        assert "run.csv: does not show whether it agrees: " in result.stderr and result.stderr.count("\n") == 1
+    else:
+        missing = [name for name in OUTPUTS if not {name, f"a.{name}"} & {*columns}]
+        assert result.returncode == 0, result.stderr
+        assert not missing or f"; not compared: {', '.join(missing)}\n" in result.stdout
+
+
+@pytest.mark.parametrize(
     "text, message",
     [
         ("", "the file is empty"),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 SAME_TIME = 1e-9
 #: If a motor differs by more than this share of the largest angle or rate of both motors, a note tells the user to look at the inputs.
 OTHER_MOTORS = 1e-2
+#: Share of the reference's times that a result must cover to agree. Some tools do not write the last time.
+COVERED = 0.95
+#: Similarity from which the title of an unknown column is taken for a misspelt output.
+MISSPELT = 0.85
 #: Relative difference up to which the ratio of result and reference is taken for the factor of a wrong unit or sign.
 NEAR = 0.02
 
@@ -78,6 +83,8 @@ class Agreement:
         (n,) by output, the result and the reference, SI.
     notes
         Notes for the user, for example on missing outputs.
+    incomplete
+        Why the result shows too little of the experiment to agree with it.
     """
 
     source: Path
@@ -87,6 +94,7 @@ class Agreement:
     found: Mapping[str, Array]
     expected: Mapping[str, Array]
     notes: tuple[str, ...]
+    incomplete: tuple[str, ...]
 
     @property
     def variables(self) -> dict[str, Difference]:
@@ -101,14 +109,25 @@ class Agreement:
 
     @property
     def agrees(self) -> bool:
-        """Whether every output that the result has is within its tolerance."""
-        return all(difference.agrees for difference in self.variables.values())
+        """Whether every output that the result has is within its tolerance, and the result is not `incomplete`."""
+        return not self.incomplete and not self.far
+
+    @property
+    def far(self) -> list[str]:
+        """Names of the outputs that are not within their tolerance."""
+        return [name for name, difference in self.variables.items() if not difference.agrees]
+
+    @property
+    def missing(self) -> list[str]:
+        """Names of the experiment's outputs that the result does not have."""
+        return [name for name in self.experiment.outputs if name not in self.found]
 
     def summary(self) -> str:
         """The compared files and the difference of each output, in a few lines."""
+        times = "1 time" if len(self.time) == 1 else f"{len(self.time)} times"
         lines = [
             f"compared    {one_line(str(self.source))} with {self.experiment.name} ({self.experiment.description})",
-            f"            {len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s, tolerances for {self.interface}",
+            f"            {times}, {self.time[0]:g} to {self.time[-1]:g} s, tolerances for {self.interface}",
         ]
         for name, found in self.variables.items():
             verdict = "" if found.agrees else f"   TOO FAR: {found.found:.6g} instead of {found.expected:.6g}"
@@ -131,6 +150,7 @@ class Agreement:
                 for name, difference in self.variables.items()
             },
             "notes": list(self.notes),
+            "incomplete": list(self.incomplete),
         }
         return write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
@@ -142,7 +162,7 @@ class Agreement:
 
         differences = self.variables
         panels = []
-        for name in [name for name, found in differences.items() if not found.agrees] or list(differences):
+        for name in self.far or list(differences):
             curves = [("reference", self.expected[name]), ("result", self.found[name])]
             found = differences[name]
             off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
@@ -160,6 +180,7 @@ class Agreement:
             rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + f"<td>{verdict}</td></tr>")
         head = "".join(f"<th>{h}</th>" for h in ("output", "off by", "allowed", "unit", "at (s)", ""))
         notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
+        notes += "".join(f"<p><strong>does not agree:</strong> {escape(reason)}</p>" for reason in self.incomplete)
         return f"<p>{escape(self.experiment.name)}</p><table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
 
 
@@ -177,8 +198,8 @@ def compare(result: Result, experiment: Experiment, interface: str) -> Agreement
     at = np.isin(experiment.reference["time"], time)
     expected = {name: experiment.reference[name][at] for name in names}
     found = {name: interpolated(result.time, result.values[name], time) for name in names}
-    bare = Agreement(result.source, experiment, interface, time, found, expected, ())
-    return Agreement(result.source, experiment, interface, time, found, expected, tuple(_notes(bare, result)))
+    bare = Agreement(result.source, experiment, interface, time, found, expected, (), ())
+    return replace(bare, notes=tuple(_notes(bare, result)), incomplete=tuple(_incomplete(bare, result)))
 
 
 def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
@@ -223,15 +244,28 @@ def _common_times(result: Result, experiment: Experiment) -> Array:
     return inside
 
 
+def _incomplete(bare: Agreement, result: Result) -> Iterator[str]:
+    """Reasons why small differences would not show that the result agrees with the experiment."""
+    experiment, tolerance = bare.experiment, bare.experiment.tolerance[bare.interface]
+    if len(bare.time) < COVERED * len(experiment.reference["time"]):
+        yield f"it has only {bare.time[0]:g} to {bare.time[-1]:g} s of 0 to {experiment.stop_time:g} s"
+    moving = [n for n in experiment.outputs if np.ptp(experiment.reference[n]) > tolerance[n]]
+    if not {*moving} & {*bare.found}:
+        yield f"no output that it has moves in this experiment; {', '.join(moving)} do, at least one is needed"
+    for name in bare.missing:
+        for title in get_close_matches(name, result.unknown, 1, MISSPELT):
+            yield f"its column {title} is not known; name it {name} if it is that, else differently"
+
+
 def _notes(bare: Agreement, result: Result) -> list[str]:
     """Notes on missing times and outputs, and on possible causes of differences."""
     experiment, notes = bare.experiment, []
     if bare.time[0] > 0 or bare.time[-1] < experiment.stop_time - SAME_TIME:
         span = f"{bare.time[0]:g} to {bare.time[-1]:g} s"
         notes.append(f"the result has only {span} of the experiment's 0 to {experiment.stop_time:g} s")
-    if missing := [name for name in experiment.outputs if name not in bare.found]:
-        notes.append(f"not in the result: {', '.join(missing)}")
-    if bare.agrees:
+    if bare.missing:
+        notes.append(f"not in the result: {', '.join(bare.missing)}")
+    if not bare.far:
         return notes
     for name in MOTORS:
         if name in result.values:

@@ -6,7 +6,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ from prw.table import read_table
 
 #: The title of a column: the components, which end with dots in Modelica and SSP and with slashes in Simulink, then the name.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
+#: The component and the first word of any title.
+TITLE = re.compile(r"^(.*[./:|])?(\w+)")
 #: Maximum memory of the values in a .mat file, in bytes.
 LARGEST = 256 << 20
 #: Bytes of a value in memory, by the name of the type in `scipy.io.whosmat`; 8 for all others. An element of a cell array or of an
@@ -46,11 +48,14 @@ class Result:
         (n,) s, increasing.
     values
         (n,) by name in `prw.columns.QUANTITIES`.
+    unknown
+        Names of the other columns of the same components.
     """
 
     source: Path
     time: Array
     values: Mapping[str, Array]
+    unknown: tuple[str, ...] = ()
 
 
 def read_result(path: Path, units: Mapping[str, str], component: str | None) -> Result:
@@ -73,7 +78,16 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
     if (np.diff(time) < 0).any():
         raise UserError(f"{path}: time runs backwards after {time[np.argmax(np.diff(time) < 0)]:g} s")
     last = np.append(np.diff(time) > 0, True)
-    return Result(path, time[last], {name: values[last] for name, values in chosen.items()})
+    return Result(path, time[last], {name: values[last] for name, values in chosen.items()}, tuple(_unknown(columns)))
+
+
+def _unknown(titles: Collection[str]) -> Iterator[str]:
+    """Names of the columns that are not known, of the components that have known ones."""
+    owners = {owner for owner, name, _ in map(_known, titles) if name not in ("", "time")}
+    for title in titles:
+        match = TITLE.match(title.strip())
+        if match and (match[1] or "")[:-1] in owners and not _known(title)[1]:
+            yield match[2]
 
 
 def _choose(

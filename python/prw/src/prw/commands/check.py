@@ -1,7 +1,7 @@
 """Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the response
 of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
 difference, its time, and whether it is within the tolerance, and draws the outputs that exceed it. Exit status 0 if all
-agree, else 1.
+agree, else 1, also if FILE has only some of the times, or no output that moves in the experiment. Other outputs may be missing.
 
 FILE is CSV, a .mat file of OpenModelica, or a .mat file that MATLAB saved with -v7 or earlier. Columns are found by name, with
 or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.
@@ -44,13 +44,15 @@ def run(arguments: argparse.Namespace) -> None:
     found = call(check, arguments, result=arguments.file)
     print(found.summary())
     if found.agrees:
-        print("agrees      with the reference")
+        rest = found.missing and f"in {', '.join(found.variables)}; not compared: {', '.join(found.missing)}"
+        print(f"agrees      {rest or 'with the reference'}")
         return
+    if not found.far:
+        raise UserError(f"{arguments.file}: does not show whether it agrees: {'; '.join(found.incomplete)}")
     figure_path = arguments.out / f"{arguments.file.stem}_check.png"
     try:
         write_png(figure_path, found.plot())
         shown = f"{figure_path} shows both"
     except MissingPackage as error:
         shown = f"for a figure of both, {error}"
-    far = [name for name, difference in found.variables.items() if not difference.agrees]
-    raise UserError(f"{arguments.file}: {', '.join(far)} too far from {found.experiment.name}; {shown}")
+    raise UserError(f"{arguments.file}: {', '.join(found.far)} too far from {found.experiment.name}; {shown}")
