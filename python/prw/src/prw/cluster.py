@@ -80,9 +80,13 @@ atexit.register(_loaded.cache_clear)
 def _connect(address: str) -> Any:
     from distributed import Client
 
+    class Connection(Client):  # type: ignore[misc]
+        def __del__(self) -> None:
+            """Do nothing: if an address is malformed, closing waits for the client that has not started. Others are closed below."""
+
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+        client = Connection(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
         reason = f"no Dask scheduler responds there ({error or 'timeout'})"
         raise UserError(reason, argument="scheduler", given=address) from None
     if not client.scheduler_info()["workers"]:
