@@ -66,13 +66,23 @@ def test_dask_cluster(prw, tmp_path):
     assert f"60 runs on {address}" in result.stdout
     assert prw(*arguments, "--out", "local").returncode == 0
     assert files(tmp_path / "remote") == files(tmp_path / "local")
+    result = prw(*arguments, "--scheduler", "foo", "--out", "absent")
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert "--scheduler foo: no Dask scheduler responds there (missing port" in result.stderr
 
 
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ([], "nothing varies; give values of a parameter (grid)"),
+        ([], "nothing varies; give --grid, --random, --identified or --table"),
         (["--grid", "k1=1:2"], "--grid k1=1:2: write NAME=LOW:HIGH:N"),
+        (["--grid", "k1=1:2:1"], "--grid k1=1:2:1: write NAME=LOW:HIGH:N, with an integer N of at least 2, or NAME="),
+        (["--grid", "M=3:5:2"], "M, N are integers, which a sweep does not vary"),
+        (["--grid", "k1=1:2:2", "--runs", "30"], "--runs 30: is for random draws; give a distribution (random)"),
+        (["--grid", "k1=1:2:2", "--sampling", "sobol"], "--sampling sobol: is for random draws; give a distribution"),
+        (["--grid", "k1=1:2:2", "--degrees"], "--degrees and --radians belong to a recording (--input)"),
+        (["--table", "a.csv", "--seed", "7"], "--seed 7: is for random draws; give a distribution (random)"),
+        (["--random", "k1=5%", "--seed", "-1"], "--seed -1: must be an integer of at least 0"),
         (["--grid", "k9=1:2:3"], "--grid: k9 is not known"),
         (["--random", "k1=5"], "--random k1=5: write NAME=10%"),
         (["--random", "k1=5%", "--runs", "0"], "--runs 0: must be an integer of at least 1"),
@@ -84,15 +94,43 @@ def test_dask_cluster(prw, tmp_path):
         (["--random", "k1=5%", "--identified", "a.json"], "--identified: replaces --random; choose one"),
         (["--identified", "a.json"], "--identified: a.json cannot be read (No such file or directory)"),
         (["--table", "a.csv", "--grid", "k1=1:2:3"], "--table: replaces grid and random; choose one"),
-        (["--table", "a.csv"], "--table: a.csv cannot be read"),
+        (["--identified", "p.json"], "--identified: p.json is not a report.json of an identification"),
+        (["--table", "a.csv"], "a.csv: cannot be read (No such file or directory)"),
         (["--again", "a.parquet"], "a.parquet: cannot be read"),
         (["--again", "a.parquet", "--grid", "k1=1:2:3"], "--again a.parquet: repeats a sweep with its own arguments"),
+        (["--again", "a.parquet", "--runs", "70"], "--again a.parquet: repeats a sweep with its own arguments"),
     ],
 )
 def test_wrong_options(prw, tmp_path, arguments, message):
+    (tmp_path / "p.json").write_text('{"parameters": {}}')
     result = prw("sweep", *arguments)
     assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("k1,k2\n100,50\n1_00,50\n", "row 3, column k1: '1_00' is not a number"),
+        ("k1\ntrue\nfalse\n", "row 2, column k1: 'true' is not a number"),
+        ("k1,k1\n1,2\n3,4\n", "table: two columns are called k1; rename or remove one"),
+        ("k1,note\n1,a\n3,b\n", "table: note is not known; there are J2"),
+        ("k1\n1\nnan\n", "row 3, column k1: nan is not finite"),
+        ("# mine\n k1 ; k2 \n100,5;50\n120;60\n", ""),
+    ],
+)
+def test_tables_are_read_as_recordings_are(fmu, tmp_path, content, message):
+    path = tmp_path / "table.csv"
+    path.write_text(content)
+    if message:
+        with pytest.raises(prw.UserError, match=message):
+            prw.sweep(table=path, fmu=fmu)
+    else:
+        found = prw.sweep(table=path, outputs="roll", statistics="end", fmu=fmu)
+        assert found["k1"].to_pylist() == [100.5, 120.0] and found["k2"].to_pylist() == [50.0, 60.0]
+    pq.write_table(pa.table([[1.0], [2.0]], names=["k1", "k1"]), tmp_path / "table.parquet")
+    with pytest.raises(prw.UserError, match="two columns are called k1"):
+        prw.sweep(table=tmp_path / "table.parquet", fmu=fmu)
 
 
 def test_a_sweep_in_which_all_runs_fail(fmu):
@@ -329,6 +367,10 @@ def test_a_sweep_is_repeated_from_its_file(prw, tmp_path, fmu):
     result = prw("sweep", "--again", "first/runs.parquet")
     assert result.returncode == 0 and "all values are equal" in result.stdout, result.stderr
     assert files(tmp_path / "first") == files(tmp_path / "out" / "sweep-again")
+    for out in ("out/sweep-again", "first"):
+        result = prw("sweep", "--again", "first/runs.parquet", *(["--out", out] if out == "first" else []))
+        assert result.returncode == 1 and result.stdout == ""
+        assert f"--out: {out}/runs.parquet exists, so nothing would be repeated; name another" in result.stderr
     record = json.loads(pq.read_schema(tmp_path / "first" / "runs.parquet").metadata[b"prw.sweep"])
     assert record["seed"] == 0 and record["random"] == {"k1": 0.1} and record["motion"]["name"] == "fig4"
     assert set(record["versions"]) == {"prw", "fmu-run", "numpy", "scipy"} and record["fmu"]["guid"]
@@ -402,7 +444,7 @@ def test_parameters_of_an_identification_and_from_a_table(fmu, tmp_path):
         (("correlation", "matrix", 1), [1], "correlation.matrix needs 3 rows and columns"),
         (("correlation", "matrix"), [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]], "has the eigenvalue -0.8"),
         (("correlation", "names", 1), "k1", "correlation.names has k1 twice"),
-        (("correlation", "names", 1), ["k1"], "is neither a dict of distributions"),
+        (("correlation", "names", 1), ["k1"], "report.json is not a report.json of an identification"),
         (("parameters", "k1", "relative_standard_error"), math.nan, "parameters.k1.relative_standard_error is nan"),
         (
             ("parameters", "k1", "relative_standard_error"),

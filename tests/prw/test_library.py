@@ -298,9 +298,14 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"random": {"k1": None}}, "random: k1 None is not a finite number above 0"),
         ({"random": {"k1": 10}}, "random: k1 has a standard deviation of 1000%; 100 % is the most"),
         ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: must be an integer of at least 1"),
-        ({"random": {"k1": 0.1}, "runs": None}, "runs None: must be an integer of at least 1"),
         ({"random": {"k1": 0.1}, "runs": 2.5}, "runs 2.5: must be an integer of at least 1"),
         ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: must be an integer of at least 1"),
+        ({"random": {"k1": 0.1}, "seed": -1}, "seed -1: must be an integer of at least 0"),
+        ({"random": {"k1": 0.1}, "seed": 1.5}, "seed 1.5: must be an integer of at least 0"),
+        ({"grid": {"k1": [1.0]}, "runs": 5}, "runs 5: is for random draws; give a distribution"),
+        ({"table": {"k1": [1.0]}, "seed": 0}, "seed 0: is for random draws; give a distribution"),
+        ({"grid": {"k1": [1.0]}, "threads": 1, "scheduler": "tcp://a:1"}, "threads: is for this machine, not for a"),
+        ({"table": {"k1": [True, False]}}, "table: k1 consists of true and false, not of numbers"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than the limit of 10000000"),
     ]:
         with pytest.raises(prw.UserError, match=message):

@@ -7,8 +7,8 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping
-from numbers import Real
+from collections.abc import Callable, Collection, Mapping, Sequence
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -29,6 +29,7 @@ from prw.arguments import (
 from prw.errors import UserError
 from prw.files import check_regular, read_text
 from prw.motion import Array
+from prw.table import read_table
 from prw.testbed import Testbed
 
 if TYPE_CHECKING:
@@ -79,14 +80,13 @@ def joint_of(random: Identification | str | os.PathLike[str]) -> Joint:
     except OSError as error:
         raise UserError(f"{random} cannot be read ({error.strerror or error})", argument="random") from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        wrong = f"{random!r} is neither a dict of distributions, nor an identification or its report.json"
         raise UserError(
-            f"{random!r} is neither a dict of distributions, nor an identification or its report.json",
-            argument="random",
+            f"{random} is not a report.json of an identification" if is_path(random) else wrong, argument="random"
         ) from None
     if identified is not True:
         raise UserError(
-            "the data did not determine the parameters, or the FMU does not explain the data; give the distributions yourself, as in "
-            '{"k1": 0.1}',
+            "the data did not determine the parameters, or the FMU does not explain the data; give the distributions yourself",
             argument="random",
         )
     values = {name: _entry(where, f"parameters.{name}.value", entry, "value") for name, entry in entries.items()}
@@ -145,32 +145,65 @@ def tabulated(table: Table | str | os.PathLike[str], testbed: Testbed, fixed: Ma
     """The columns of a table, (runs,) by parameter. Raises UserError if it cannot be read or has other columns than parameters."""
     where = "table"
     if is_path(table):
-        import pyarrow as pa
-        from pyarrow import csv, parquet
-
-        path = Path(table)  # type: ignore[arg-type]
-        where = str(path)
-        try:
-            check_regular(path)
-            read = parquet.read_table(path) if path.suffix == ".parquet" else csv.read_csv(path)
-        except (OSError, pa.ArrowException) as error:
-            raise UserError(f"{where} cannot be read ({error})", argument="table") from None
-        columns = {name: read[name].to_numpy() for name in read.column_names}
+        where = str(table)
+        read = _parquet if Path(where).suffix.lower() == ".parquet" else _csv
+        columns = read(Path(where), lambda names: _check("table", names, testbed))
     elif is_table(table):
         columns = columns_of(table)
     else:
         raise UserError(f"{table!r} is neither a table nor the path of a CSV or Parquet file", argument="table")
-    check_names("table", columns, testbed.starts)
+    _check("table", columns, testbed)
     if both := [name for name in columns if name in fixed]:
         raise UserError(f"{both[0]} is also in parameters; choose one", argument="table")
+    for name, column in columns.items():
+        if np.asarray(column).dtype.kind == "b":
+            raise UserError(f"{where}: {name} consists of true and false, not of numbers")
     values = {name: numbers_of(f"{where}: {name}", column) for name, column in columns.items()}
     lengths = {len(column) for column in values.values()}
     if len(lengths) != 1 or not 0 < min(lengths) <= MAX_RUNS:
         raise UserError(f"needs 1 to {MAX_RUNS} rows and equally long columns", argument="table")
     for name, column in values.items():
         if not np.isfinite(column).all():
-            raise UserError(f"{name} has values that are not finite numbers", argument="table")
+            row = int(np.isfinite(column).argmin()) + 1
+            raise UserError(f"{name} has values that are not finite numbers, first in row {row}", argument="table")
     return values
+
+
+def _csv(path: Path, check: Callable[[Collection[str]], None]) -> dict[str, Array]:
+    """The columns of a CSV file, with the rules of recordings. check: raises UserError for a wrong name."""
+    names: list[str] = []
+
+    def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
+        check(header)
+        names.extend(header)
+        return [(name, k) for k, name in enumerate(header)]
+
+    table = read_table(path, choose)
+    return dict(zip(names, table.T))
+
+
+def _parquet(path: Path, check: Callable[[Collection[str]], None]) -> dict[str, Any]:
+    """The columns of a Parquet file. check: raises UserError for a wrong name."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        check_regular(path)
+        check(parquet.read_schema(path).names)
+        read = parquet.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    return {name: read[name].to_numpy() for name in read.column_names}
+
+
+def _check(argument: str, names: Collection[str], testbed: Testbed) -> None:
+    """Raise UserError for a name that is not a Real parameter, or that is there twice."""
+    variables = testbed.loaded.variables.values()
+    integers = [v.name for v in variables if v.causality == "parameter" and "Int" in v.type]
+    more = f"; {', '.join(integers)} are integers, which a sweep does not vary" if integers else ""
+    check_names(argument, names, testbed.starts, more)
+    if doubled := [name for k, name in enumerate(names) if name in list(names)[:k]]:
+        raise UserError(f"two columns are called {doubled[0]}; rename or remove one", argument=argument)
 
 
 def layout(
@@ -187,14 +220,16 @@ def layout(
     invalid arguments."""
     drawn = random.medians if isinstance(random, Joint) else random
     starts = {**testbed.starts, **fixed}
-    check_names("grid", grid, testbed.starts)
-    check_names("random", drawn, testbed.starts)
+    _check("grid", grid, testbed)
+    _check("random", drawn, testbed)
     for name in (*grid, *drawn):
         if (name in grid) + (name in drawn) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not drawn:
         raise UserError("nothing varies; give values of a parameter (grid), its distribution (random) or a table")
     draws = counted("runs", runs) if drawn else 1
+    if not isinstance(seed, Integral) or seed < 0:
+        raise UserError("must be an integer of at least 0", argument="seed", given=repr(seed))
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
     if total > MAX_RUNS:

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from prw.arguments import Given, Table, check_names, counted, names_of, numbers_of, values_of
 from prw.batch import Part, Request, run_part
-from prw.draws import Joint, Random, joint_of, layout, tabulated
+from prw.draws import SAMPLINGS, Joint, Random, joint_of, layout, tabulated
 from prw.errors import Interrupted, UserError, need
 from prw.motion import Array, Motion
-from prw.parts import Parts, digest, part_size, record_in, versions
+from prw.parts import TABLE, Parts, digest, part_size, record_in, versions
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: The default statistics of each output.
 STATISTICS: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
+#: The default number, seed and method of random draws.
+DRAWS: dict[str, Any] = {"runs": 1000, "seed": 0, "sampling": SAMPLINGS[0]}
 
 
 def sweep(
@@ -37,9 +39,9 @@ def sweep(
     table: Table | str | os.PathLike[str] | None = None,
     again: str | os.PathLike[str] | None = None,
     parameters: Given = None,
-    runs: int = 1000,
-    seed: int = 0,
-    sampling: str = "random",
+    runs: int | None = None,
+    seed: int | None = None,
+    sampling: str | None = None,
     outputs: str | Sequence[str] | None = None,
     statistics: str | Sequence[str] | None = None,
     trajectories: int | None = None,
@@ -67,14 +69,15 @@ def sweep(
         columns are parameters in SI.
     again
         A file runs.parquet, whose sweep is repeated with the parameters, outputs and statistics that the file contains. `motion` and
-        `fmu` must be as in that sweep. Only `threads`, `scheduler` and `out` may be given in addition to these.
+        `fmu` must be as in that sweep, and `out` may not contain a finished sweep. Only `threads`, `scheduler` and `out` may be given
+        in addition to these.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     runs, seed
-        Number of random draws for each combination of the grid, and their seed.
+        Number of random draws for each combination of the grid (default: 1000), and their seed (default: 0).
     sampling
-        How draws are distributed: "random", "latin" (Latin hypercube) or "sobol" (scrambled Sobol points; `runs` must be a power of
-        2). The last two cover the distribution more evenly, so that averages need fewer runs.
+        How draws are distributed: "random" (default), "latin" (Latin hypercube) or "sobol" (scrambled Sobol points; `runs` must be a
+        power of 2). The last two cover the distribution more evenly, so that averages need fewer runs.
     outputs
         Names of the outputs, any Real variables (default: those of `prw.simulate`).
     statistics
@@ -116,28 +119,44 @@ def sweep(
     RuntimeWarning
         All runs failed.
     """
-    need("pyarrow", "scipy", *(["distributed"] if scheduler else []))
+    need("pyarrow", "scipy", *(["distributed"] if scheduler is not None else []))
+    if scheduler is not None and threads is not None:
+        raise UserError("is for this machine, not for a cluster (scheduler); omit one", argument="threads")
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
+    draws: dict[str, Any] = {"runs": runs, "seed": seed, "sampling": sampling}
     moved = motion_of(motion)
     with Testbed(existing_fmu(fmu)) as testbed:
         if again is not None:
-            if any(given is not None for given in (grid, random, table, parameters, outputs, statistics, trajectories)):
+            own = (grid, random, table, parameters, outputs, statistics, trajectories, *draws.values())
+            if any(given is not None for given in own):
                 raise UserError("repeats a sweep with its own arguments; omit them", argument="again", given=again)
+            if out is not None and (Path(out) / TABLE).exists():
+                raise UserError(
+                    f"{Path(out) / TABLE} exists, so nothing would be repeated; name another directory, or remove it",
+                    argument="out",
+                )
             request, values, record = _recorded(Path(again), testbed, moved)
         else:
+            if random is None:
+                for name, given in draws.items():
+                    if given is not None:
+                        raise UserError(
+                            "is for random draws; give a distribution (random), or omit it", argument=name, given=given
+                        )
+            draws = {name: DRAWS[name] if given is None else given for name, given in draws.items()}
             fixed = values_of(parameters, testbed.loaded)
             joint = random if random is None or isinstance(random, Mapping) else joint_of(random)
             if isinstance(joint, Joint):
                 fixed = {**{n: v for n, v in joint.others.items() if n not in (grid or {})}, **fixed}
             testbed.with_starts(fixed)
             if table is None:
-                values = layout(grid or {}, joint or {}, runs, seed, sampling, testbed, fixed)
+                values = layout(grid or {}, joint or {}, testbed=testbed, fixed=fixed, **draws)
             elif grid is not None or random is not None:
                 raise UserError("replaces grid and random; choose one", argument="table")
             else:
                 values = tabulated(table, testbed, fixed)
             request = _request(moved, fixed, outputs, statistics, trajectories, testbed)
-            drawn = {"runs": runs, "seed": seed, "sampling": sampling} if random is not None else {}
+            drawn = draws if random is not None else {}
             distribution = joint._asdict() if isinstance(joint, Joint) else joint
             record = {"grid": grid, "random": distribution, **drawn, **_record(request, values, testbed)}
         if request.every and out is None:
@@ -150,7 +169,8 @@ def sweep(
                 warnings.warn(note, UserWarning, stacklevel=2)
             found = _complete(parts, testbed, request, values, threads, scheduler, progress)
     if "done" not in found["status"].to_pylist():
-        warnings.warn(f"all {found.num_rows} runs failed; run 0: {found['message'][0]}", RuntimeWarning, stacklevel=2)
+        all_runs = "the only run" if found.num_rows == 1 else f"all {found.num_rows} runs"
+        warnings.warn(f"{all_runs} failed; run 0: {found['message'][0]}", RuntimeWarning, stacklevel=2)
     return found
 
 
@@ -241,7 +261,7 @@ def _complete(
         report(done)
         if not missing:
             results: Iterator[tuple[int, Part]] = iter(())
-        elif scheduler:
+        elif scheduler is not None:
             from prw.cluster import on_cluster
 
             results = stack.enter_context(

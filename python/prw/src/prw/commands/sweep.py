@@ -14,14 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT, Named, add_paths, add_unit_options, call, listed, show, spread
+from prw.commands.options import DEFAULT_OUT, FMU, Named, add_unit_options, call, listed, show, spread
 from prw.draws import SAMPLINGS
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
 from prw.parts import TABLE, TRAJECTORIES
 from prw.recording import read_motion
-from prw.sweeps import STATISTICS, repeated, sweep
+from prw.sweeps import DRAWS, STATISTICS, repeated, sweep
 
+OUT, OUT_AGAIN = DEFAULT_OUT / "sweep", DEFAULT_OUT / "sweep-again"
 HELP = "run the FMU with many sets of parameters"
 EXAMPLES = """\
 examples:
@@ -38,21 +39,25 @@ then:
 
 
 def _steps(string: str) -> Array:
-    """N even steps from LOW to HIGH. Raises ValueError."""
+    """N even values from LOW to HIGH. Raises ValueError."""
     parts = string.split(":")
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
+        if len(parts) != 3 or count < 1 + (low != high) or not np.isfinite([low, high]).all():
             raise ValueError
     except (ValueError, IndexError):
-        raise ValueError("write NAME=LOW:HIGH:N with an integer N of at least 1") from None
+        raise ValueError("write NAME=LOW:HIGH:N, with an integer N of at least 2, or NAME=VALUE:VALUE:1") from None
     return np.linspace(low, high, count)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument(
-        "--grid", action=Named, read=_steps, metavar="NAME=LOW:HIGH:N", help="N even steps, in SI. May be repeated"
+        "--grid",
+        action=Named,
+        read=_steps,
+        metavar="NAME=LOW:HIGH:N",
+        help="N even values, the first is LOW and the last HIGH, in SI. May be repeated",
     )
     parser.add_argument(
         "--random",
@@ -61,7 +66,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=[VALUE:]PERCENT%",
         help="log-normal about VALUE in SI (default: the start value). May be repeated",
     )
-    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
+    parser.add_argument(
+        "--runs",
+        type=int,
+        metavar="N",
+        help=f"draws of --random or --identified for each combination of --grid (default: {DRAWS['runs']})",
+    )
     parser.add_argument(
         "--identified",
         type=Path,
@@ -77,12 +87,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--again", type=Path, metavar="FILE", help="a runs.parquet whose sweep is repeated, and compared with it"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
+    parser.add_argument("--seed", type=int, help=f"of the draws (default: {DRAWS['seed']})")
     parser.add_argument(
         "--sampling",
         choices=SAMPLINGS,
-        default=SAMPLINGS[0],
-        help="Latin hypercube or Sobol points cover the distribution more evenly (default: %(default)s)",
+        help=f"Latin hypercube or Sobol points cover the distribution more evenly (default: {DRAWS['sampling']})",
     )
     parser.add_argument("--outputs", type=listed, metavar="NAMES", help="separated by commas (default: all)")
     parser.add_argument(
@@ -107,11 +116,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
     parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
-    add_paths(parser, directory="sweep")
+    parser.add_argument("--fmu", type=Path, help=FMU)
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help=f"directory to write into (default: {OUT}, with --again {OUT_AGAIN})"
+    )
+
+
+def _runs(count: int, kind: str = "") -> str:
+    return f"{count} {kind}run{'s' * (count != 1)}"
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with a message of one line."""
+    if arguments.input is None and arguments.degrees is not None:
+        raise UserError("--degrees and --radians belong to a recording (--input); the motion of Fig. 4 is in radians")
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
     arguments.options = {"motion": "--input"}
@@ -119,9 +137,12 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.random:
             raise UserError("replaces --random; choose one", argument="identified")
         arguments.options["random"] = "--identified"
+    varied = (arguments.identified, arguments.table, arguments.again)
+    if not (arguments.grid or arguments.random or any(path is not None for path in varied)):
+        raise UserError("nothing varies; give --grid, --random, --identified or --table")
     need("pyarrow")
-    if arguments.again is not None and arguments.out == DEFAULT_OUT / "sweep":
-        arguments.out = arguments.out.with_name("sweep-again")
+    if arguments.out is None:
+        arguments.out = OUT if arguments.again is None else OUT_AGAIN
     finished: list[int] = []
     notes: list[str] = []
     begin = time.monotonic()
@@ -139,13 +160,13 @@ def run(arguments: argparse.Namespace) -> None:
     for note in notes:
         show(f"note        {note}")
     if earlier:
-        show(f"kept        {earlier} finished runs in {arguments.out}")
+        show(f"kept        {_runs(earlier, 'finished ')} in {arguments.out}")
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
-    show(f"ran         {count} runs on {where} in {seconds:.1f} s ({count / seconds:.0f} per second)")
+    show(f"ran         {_runs(count)} on {where} in {seconds:.1f} s ({count / seconds:.0f} per second)")
     status = table.column("status").to_pylist()
     if failed := status.count("failed"):
         first = status.index("failed")
-        show(f"failed      {failed} runs; run {first}: {table.column('message')[first]}")
+        show(f"failed      {_runs(failed)}; run {first}: {table.column('message')[first]}")
     if arguments.again is not None:
         unlike = repeated(arguments.again, table)
         verdict = f"other values in {', '.join(unlike)}" if unlike else "all values are equal"
