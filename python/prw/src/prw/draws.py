@@ -8,7 +8,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from numbers import Integral, Real
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -178,7 +178,7 @@ def _csv(path: Path, check: Callable[[Collection[str]], None]) -> dict[str, Arra
         names.extend(header)
         return [(name, k) for k, name in enumerate(header)]
 
-    table = read_table(path, choose)
+    table = read_table(path, choose, least=1)
     return dict(zip(names, table.T))
 
 
@@ -228,8 +228,7 @@ def layout(
     if not grid and not drawn:
         raise UserError("nothing varies; give values of a parameter (grid), its distribution (random) or a table")
     draws = counted("runs", runs) if drawn else 1
-    if not isinstance(seed, Integral) or seed < 0:
-        raise UserError("must be an integer of at least 0", argument="seed", given=repr(seed))
+    counted("seed", seed, least=0)
     axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
     if total > MAX_RUNS:

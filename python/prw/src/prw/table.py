@@ -43,18 +43,20 @@ def read_table(
     increasing: bool = False,
     skip: int = 0,
     encoding: str = "",
+    least: int = 2,
 ) -> Array:
     """Read the columns (rows, columns) that `choose` selects from the header, in the format that `prw.read` describes.
 
     An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
     increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 if the file begins with its byte order mark).
+    least: number of rows, 1 or 2.
     Raises UserError naming the file and, where possible, the line and the column.
     """
     try:
         check_regular(path)
         chosen = encoding or _encoding(path)
         with open(path, encoding=chosen, newline="") as file:
-            return _parse(path, file, choose, may_be_empty, increasing, skip)
+            return _parse(path, file, choose, may_be_empty, increasing, skip, least)
     except UnicodeError:
         if not encoding and _is_binary(path):
             raise UserError(f"{path}: {NO_TEXT}") from None
@@ -72,8 +74,9 @@ def _encoding(path: Path) -> str:
 
 
 def _parse(
-    path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool, skip: int
+    path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool, skip: int, least: int
 ) -> Array:
+    needed = "at least two rows are needed" if least > 1 else "at least one row is needed"
     begin, first = _top(file, skip)
     # Excel reads the separator from such a line above the header.
     separator = re.fullmatch(r'"?sep=(.)"?\s*', first, re.IGNORECASE)
@@ -81,7 +84,7 @@ def _parse(
         more, first = _top(file, 0)
         begin += 1 + more
     if not first:
-        raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
+        raise UserError(f"{path}: the file is empty; a header and {needed}")
     delimiter = separator[1] if separator else next((d for d in DELIMITERS if d in first), ",")
     file.seek(0)
     table = csv.reader(_lines(path, file), delimiter=delimiter, skipinitialspace=True)
@@ -98,9 +101,9 @@ def _parse(
         values = _rows(path, table, len(header), columns, may_be_empty, increasing, os.fstat(file.fileno()).st_size)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
-    if len(values) < 2:
+    if len(values) < least:
         rows = "only one row below the header" if len(values) else "no rows below the header"
-        raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
+        raise UserError(f"{_where(path, table.line_num)}: {rows}; {needed}")
     return values
 
 
