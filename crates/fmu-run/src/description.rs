@@ -467,7 +467,7 @@ fn spread(of: &Declared, elements: Option<Range<u32>>, arrays: &Arrays, variable
         attributes: Arc::clone(&attributes),
     };
     if sizes.is_empty() {
-        // A start value with blanks in it is no value, and reading a part of it would be a guess.
+        // A start value such as "7 .5" is kept whole, because its first part alone would be another number.
         let start = (!of.start.is_empty()).then(|| Arc::from(of.start.join(" ")));
         return variables.push(variable(of.name.clone(), of.reference, start));
     }

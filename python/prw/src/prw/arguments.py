@@ -165,7 +165,7 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
     inner = content.get("parameters")
     if not isinstance(inner, dict):
         return {name: _value(path, name, entry, loaded, False) for name, entry in content.items()}
-    # report.json contains the FMU, the parameters and other things.
+    # In the report of an identification, which names its FMU, the parameters are one member of several.
     report = "fmu" in content
     for name in content:
         if name != "parameters" and (name in loaded.variables or not report):

@@ -207,7 +207,7 @@ def _rivals(best: _Trial, rest: list[_Trial]) -> list[_Trial]:
         for t in rest
         if t.verdict.fits
         and t.gain > best.gain - ALIKE_GAIN
-        # A delay of more channels is not another cause.
+        # The same delay of more or fewer channels is not another cause.
         and (t.hypothesis.kind != kind or not set(t.hypothesis.places) & set(places))
     ]
     # A gain of all torques and wrong inertias have nearly the same effect.
