@@ -3,6 +3,7 @@
 mod configured;
 mod definition;
 mod elements;
+mod known;
 mod order;
 mod osp;
 mod ssp;

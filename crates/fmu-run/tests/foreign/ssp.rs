@@ -576,6 +576,49 @@ fn wrong_mappings_and_annotations() {
     assert_eq!(system.warnings(), ["SystemStructure.ssd is of version 2.0 and is read as SSP 1.0"]);
 }
 
+#[test]
+fn what_ssp_does_not_define_is_a_warning() {
+    let system = elements(&(component("a", &connectors(&[("y", "output", "")])) + &component("b", "")))
+        + &connections(&[connection("a.y", "b.u", "")])
+        + &binding("", &[("a.gain", REAL[1])], "");
+    for (written_as, instead, warning) in [
+        (
+            "Connections>",
+            "Conections>",
+            "a System has the unknown element Conections; there are Connectors, ",
+        ),
+        (
+            " startConnector",
+            " starElement=\"a\" startConnector",
+            "a Connection has the unknown attribute starElement; there",
+        ),
+        (
+            "<ssd:ParameterBinding ",
+            "<ssd:ParameterBinding prefx=\"b.\" ",
+            "attribute prefx; there are type, source, sourceBase, prefix;",
+        ),
+        (
+            "<ssv:Parameter ",
+            "<ssv:Parameter unit=\"m\" ",
+            "a Parameter has the unknown attribute unit; there are name; it is not used",
+        ),
+    ] {
+        let changed = system.replace(written_as, instead);
+        assert_ne!(changed, system, "{written_as}");
+        let found = opened(written(&changed, "", &[]).path(), Order::Jacobi).unwrap().warnings().to_vec();
+        assert!(
+            matches!(&found[..], [one] if one.contains(warning) && one.ends_with("it is not used")),
+            "{written_as}: {found:?}"
+        );
+    }
+    let indexed = system.replace(" startConnector", " startIndices=\"1\" startConnector");
+    let found = opened(written(&indexed, "", &[]).path(), Order::Jacobi).unwrap_err().to_string();
+    assert!(
+        found.contains("a connection has startIndices, and elements of arrays cannot be connected"),
+        "{found}"
+    );
+}
+
 /// libcosim takes the output from the causalities, so the two variables of a connection have any order.
 #[test]
 fn systems_for_libcosim_are_opened() {

@@ -48,6 +48,7 @@ impl System {
         if let Some(other) = root.attribute("version").filter(|version| *version != "1.0") {
             read.warn(|| format!("{STRUCTURE} is of version {} and is read as SSP 1.0", shown(other)));
         }
+        read.warn_of_others(root);
         read.outer_system(system).map_err(fail)?;
 
         let names =

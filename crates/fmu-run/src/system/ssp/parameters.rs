@@ -1,6 +1,6 @@
 //! Start values of a system: parameter sets and the mappings of their names and values (sections 5.2.3, 6 and 7 of SSP 1.0).
 
-use super::read::{Binding, Place, Read, Transformation, child, children, needed, only_attributes, units};
+use super::read::{Binding, Place, Read, Transformation, child, children, needed, units};
 use super::routes::{Link, NamedUnit, Routes};
 use super::source::Base;
 use crate::change::Change;
@@ -8,6 +8,7 @@ use crate::connector;
 use crate::error::{Error, request};
 use crate::lookup::Found;
 use crate::system::Definition;
+use crate::system::known::only_attributes;
 use fmi_abi::files::read_xml;
 use fmi_abi::xml::attribute;
 use fmi_abi::{Value, boolean, shown, xml};
@@ -186,6 +187,7 @@ impl Read<'_> {
         self.take(text.len())?;
         let mut declared = String::new();
         let document = xml::parse_undeclared(&text, &shown(&name), &mut declared)?;
+        self.warn_of_others(document.root_element());
         self.parameters(document.root_element(), prefix)
     }
 
@@ -257,6 +259,7 @@ impl Read<'_> {
         self.take(text.len())?;
         let mut declared = String::new();
         let document = xml::parse_undeclared(&text, &shown(&name), &mut declared)?;
+        self.warn_of_others(document.root_element());
         self.entries(document.root_element()).map(Some)
     }
 

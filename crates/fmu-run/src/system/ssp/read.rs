@@ -1,10 +1,11 @@
 //! Reads the structure of a system: components, connectors, connections and parameter bindings.
 
-use super::FMU;
 use super::source::Base;
+use super::{FMU, KNOWN};
 use crate::change::Change;
 use crate::connector::joined;
 use crate::error::Error;
+use crate::system::known::{only_attributes, warn_of_others};
 use fmi_abi::description::Item;
 use fmi_abi::xml::attribute;
 use fmi_abi::{BaseUnit, boolean, shown};
@@ -154,6 +155,11 @@ impl<'r> Read<'r> {
         }
     }
 
+    /// Adds a warning for each element and attribute that SSP does not define.
+    pub fn warn_of_others(&self, root: Node) {
+        warn_of_others(root, KNOWN, &mut |why| self.warn(|| why));
+    }
+
     /// Returns the warnings, each once.
     pub fn take_warnings(&self) -> Vec<String> {
         let mut all = self.warnings.take();
@@ -264,6 +270,11 @@ impl<'r> Read<'r> {
     fn connection(&mut self, connection: Node<'r, 'r>, system: usize) -> Result<(), String> {
         let end = |side: &str| -> Result<Endpoint<'r>, String> {
             let connector = needed(connection, &format!("{side}Connector"))?;
+            if connection.has_attribute(format!("{side}Indices").as_str()) {
+                return Err(format!(
+                    "a connection has {side}Indices, and elements of arrays cannot be connected"
+                ));
+            }
             let element = connection.attribute(format!("{side}Element").as_str()).unwrap_or_default();
             if element.is_empty() {
                 return Ok(Endpoint { place: (system, connector), is_own: true });
@@ -399,20 +410,6 @@ pub(in crate::system) fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Nod
 
 pub(in crate::system) fn children<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
     child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
-}
-
-/// Fails if an element has other attributes than these and those of every element (section 4.1 of SSP 1.0): a misspelt one would be ignored.
-pub(in crate::system) fn only_attributes(node: Node, known: &[&str]) -> Result<(), String> {
-    let is_known = |name: &str| known.contains(&name) || matches!(name, "id" | "description");
-    match node.attributes().find(|of| of.namespace().is_none() && !is_known(of.name())) {
-        Some(other) => Err(format!(
-            "a {} has the unknown attribute {}; there are {}",
-            shown(node.tag_name().name()),
-            shown(other.name()),
-            known.join(", ")
-        )),
-        None => Ok(()),
-    }
 }
 
 pub(in crate::system) fn needed<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
