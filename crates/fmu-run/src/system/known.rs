@@ -11,35 +11,39 @@ pub(super) type Known = (&'static str, &'static [&'static str], &'static [&'stat
 pub(super) fn warn_of_others(node: Node, table: &[Known], warn: &mut dyn FnMut(String)) {
     let name = node.tag_name().name();
     let Some((_, elements, attributes)) = table.iter().find(|known| known.0 == name) else { return };
-    only_attributes(node, attributes).unwrap_or_else(|why| warn(format!("{why}; it is not used")));
+    let mut not_used = |what: &str, other: &str, known: &[&str]| {
+        let known = if known.is_empty() { "there is none" } else { &*known.join(", ") };
+        warn(format!("the {what} {} of a {name} is not used; known: {known}", shown(other)));
+    };
+    for other in other_attributes(node, attributes) {
+        not_used("attribute", other, attributes);
+    }
     for inner in node.children().filter(Node::is_element) {
         let other = inner.tag_name().name();
-        if elements.contains(&other) {
-            warn_of_others(inner, table, warn);
-        } else {
-            warn(format!(
-                "a {name} has the unknown element {}{}; it is not used",
-                shown(other),
-                there_are(elements)
-            ));
+        if !elements.contains(&other) {
+            not_used("element", other, elements);
         }
+    }
+    for inner in node.children().filter(|inner| elements.contains(&inner.tag_name().name())) {
+        warn_of_others(inner, table, warn);
     }
 }
 
 /// Fails if an element has other attributes than these and those of every element.
 pub(super) fn only_attributes(node: Node, known: &[&str]) -> Result<(), String> {
-    let is_known = |name: &str| known.contains(&name) || matches!(name, "id" | "description");
-    match node.attributes().find(|of| of.namespace().is_none() && !is_known(of.name())) {
+    match other_attributes(node, known).next() {
         Some(other) => Err(format!(
-            "a {} has the unknown attribute {}{}",
+            "a {} has the unknown attribute {}; there are {}",
             shown(node.tag_name().name()),
-            shown(other.name()),
-            there_are(known)
+            shown(other),
+            known.join(", ")
         )),
         None => Ok(()),
     }
 }
 
-fn there_are(known: &[&str]) -> String {
-    if known.is_empty() { String::new() } else { format!("; there are {}", known.join(", ")) }
+fn other_attributes<'a>(node: Node<'a, '_>, known: &[&str]) -> impl Iterator<Item = &'a str> {
+    let is_known = |name: &str| known.contains(&name) || matches!(name, "id" | "description");
+    let names = node.attributes().filter(|of| of.namespace().is_none()).map(|of| of.name());
+    names.filter(move |name| !is_known(name))
 }

@@ -5,13 +5,28 @@ use crate::connector::Place;
 use crate::connector::joined;
 use crate::error::{Error, request};
 use crate::start::StartValues;
-use crate::system::ssp::{Base, child, children, needed};
+use crate::system::known::{Known, warn_of_others};
+use crate::system::ssp::{Base, WARNINGS, child, children, needed};
 use crate::system::{Definition, Order, System};
 use fmi_abi::files::{Limits, read_xml};
 use fmi_abi::xml::{self, attribute};
 use fmi_abi::{Causality, Value, shown};
 use roxmltree::Node;
 use std::path::{Path, PathBuf};
+
+/// Elements and attributes that have a meaning here. Step sizes of simulators and power bonds have none: all components step together.
+#[rustfmt::skip]
+const KNOWN: &[Known] = &[
+    ("OspSystemStructure", &["Description", "StartTime", "EndTime", "BaseStepSize", "Algorithm", "Simulators", "Functions",
+        "Connections"], &["version"]),
+    ("Simulators", &["Simulator"], &[]),
+    ("Simulator", &["InitialValues"], &["name", "source"]),
+    ("InitialValues", &["InitialValue"], &[]),
+    ("InitialValue", &["Real", "Integer", "Boolean", "String"], &["variable"]),
+    ("Connections", &["VariableConnection"], &[]),
+    ("VariableConnection", &["Variable"], &[]),
+    ("Variable", &[], &["simulator", "name", "causality"]),
+];
 
 /// A connection between two variables, each with its simulator.
 type Connection<'d> = [(&'d str, &'d str); 2];
@@ -59,6 +74,11 @@ impl System {
         // SAFETY: the caller has met the requirement.
         let components = unsafe { Self::load(&read.simulators, directory, &mut Limits::default()) };
         let mut definition = Definition::of("system", components.map_err(fail)?);
+        warn_of_others(document.root_element(), KNOWN, &mut |why| {
+            if definition.warnings.len() < WARNINGS && !definition.warnings.contains(&why) {
+                definition.warnings.push(why);
+            }
+        });
         definition.check_components()?;
         let connections = read.connections.iter().map(|ends| directed(&definition, ends));
         let connections = connections.collect::<Result<_, Error>>()?;

@@ -9,7 +9,7 @@ mod source;
 mod write;
 
 use crate::system::known::Known;
-pub(super) use read::{child, children, needed};
+pub(super) use read::{WARNINGS, child, children, needed};
 pub(super) use source::Base;
 
 /// Type of the components that are FMUs.

@@ -33,7 +33,7 @@ const KINDS: [&str; 9] = [
 ];
 
 /// Maximum number of warnings.
-const WARNINGS: usize = 100;
+pub(in crate::system) const WARNINGS: usize = 100;
 
 /// A connector of a system, or a connector or variable of a component: the index of the element and the name in it. They are not joined
 /// to one name, because both may contain dots.
