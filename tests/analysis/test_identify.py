@@ -172,6 +172,12 @@ def test_wrong_options(prw, tmp_path, experiment, arguments, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_file_after_follow_is_not_a_number_of_steps(prw):
+    result = prw("identify", "--follow", "run.csv")
+    assert result.returncode == 2
+    assert "'run.csv' is not a number of steps; put files before --follow" in result.stderr
+
+
 def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
     """With equal motor angles the wrist does not roll, so J3 is undetermined, although the steps of the two encoders differ. The other
     parameters are identified."""

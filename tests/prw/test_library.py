@@ -305,7 +305,10 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"grid": {"k1": [1.0]}, "runs": 5}, "runs 5: is for random draws; give a distribution"),
         ({"table": {"k1": [1.0]}, "seed": 0}, "seed 0: is for random draws; give a distribution"),
         ({"grid": {"k1": [1.0]}, "threads": 1, "scheduler": "tcp://a:1"}, "threads: is for this machine, not for a"),
-        ({"table": {"k1": [True, False]}}, "table: k1 consists of true and false, not of numbers"),
+        (
+            {"table": {"k1": [True, False]}},
+            "table: k1: does not consist of numbers; convert strings and Booleans first",
+        ),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than the limit of 10000000"),
     ]:
         with pytest.raises(prw.UserError, match=message):

@@ -367,6 +367,9 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at index 1 is not finite"),
         ({**good, "theta2": np.ma.array([0.0, 9.0], mask=[False, True])}, "theta2: nan at index 1 is masked"),
         ({**good, "theta2": ["a", "b"]}, "recording, column theta2: does not consist of numbers"),
+        ({**good, "theta2": ["0", "1_000"]}, "theta2: does not consist of numbers; convert strings"),
+        ({**good, "theta2": pandas.Series([0, "1"])}, "theta2: does not consist of numbers; convert strings"),
+        ({**good, "theta2": [False, True]}, "theta2: does not consist of numbers; convert strings and Booleans"),
         ({**good, "theta2": pandas.array([0, None], dtype="Int64")}, "theta2: nan at index 1 is not finite"),
         ({**good, "theta2": ([0.0, 1.0], "deg")}, "recording, column theta2: is a pair of values and a unit"),
         ({**good, "theta2": [[0.0], [1.0, 2.0]]}, "recording, column theta2: does not consist of numbers"),
@@ -376,8 +379,13 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
         (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
+        ({}, "must have the columns time, theta1, theta2, but it has none"),
         (None, "None is not a recording: neither a file nor a DataFrame"),
     ]
     for source, message in wrong:
         with pytest.raises(UserError, match=message):
             read(source)
+    options: list[dict[str, Any]] = [{"skip": 1}, {"encoding": "latin-1"}]
+    for option in options:
+        with pytest.raises(UserError, match="belongs to a file; this is a table in memory"):
+            read(good, **option)

@@ -97,11 +97,16 @@ fn the_old_fmu_remains_until_the_new_one_is_complete() {
     let left = names();
     assert!(left.len() == 1 && left[0].starts_with(".unfinished-"), "{left:?}");
 
-    let begin = Instant::now();
-    let output = build_fmu(&library, out).output().unwrap();
-    assert!(output.status.success(), "{output:?}");
+    let build = || {
+        let begin = Instant::now();
+        let output = build_fmu(&library, out).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        begin.elapsed()
+    };
+    let first = build();
     assert_eq!(names(), [""; 0], "the temporary file of the killed process must be removed");
-    killed_at_any_time(|| build_fmu(&library, out), begin.elapsed(), &fmu);
+    // The shortest of three, because a build waits until other builds in the workspace have ended.
+    killed_at_any_time(|| build_fmu(&library, out), first.min(build()).min(build()), &fmu);
 }
 
 /// Asserts that the file is the old FMU or the new one after `kill -9` at any time.

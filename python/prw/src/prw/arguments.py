@@ -120,9 +120,17 @@ def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
         # pandas.NA cannot be converted.
         if array.dtype.kind == "O" and hasattr(values, "isna"):
             array = np.where(values.isna(), np.nan, array)
+        # numpy would convert "1_000" and True.
+        texts = (
+            array.dtype.kind in "USTb"
+            or array.dtype.kind == "O"
+            and any(isinstance(x, (str, bytes, bool)) for x in array.flat)
+        )
         array = np.zeros(len(array)) if dates else array.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise UserError(f"{where}: does not consist of numbers ({error})") from None
+    if texts:
+        raise UserError(f"{where}: does not consist of numbers; convert strings and Booleans first")
     if dates:
         raise UserError(f"{where}: has dates or durations; write seconds as numbers")
     if array.ndim != 1:

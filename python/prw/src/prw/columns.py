@@ -155,10 +155,9 @@ def columns(
     if not found:
         is_number = [re.fullmatch(r"\s*[-+]?[\d.]+(?:e[-+]?\d+)?\s*", title, re.IGNORECASE) for title in header]
         what = "there is no header" if all(is_number) else "this is not a table of motor angles"
+        has = f"the row has {shown(header)}" if header else "it has none"
         hint = "; separate columns by comma, semicolon or tab" if len(header) == 1 and "theta1" in header[0] else ""
-        raise UserError(
-            f"{where}: {what}; it must have the columns time, theta1, theta2, but the row has {shown(header)}{hint}"
-        )
+        raise UserError(f"{where}: {what}; it must have the columns time, theta1, theta2, but {has}{hint}")
     for name in ("time", *ANGLES):
         if name not in found:
             hint = "; separate columns by comma, semicolon or tab" if line and len(header) == 1 else ""

@@ -155,9 +155,6 @@ def tabulated(table: Table | str | os.PathLike[str], testbed: Testbed, fixed: Ma
     _check("table", columns, testbed)
     if both := [name for name in columns if name in fixed]:
         raise UserError(f"{both[0]} is also in parameters; choose one", argument="table")
-    for name, column in columns.items():
-        if np.asarray(column).dtype.kind == "b":
-            raise UserError(f"{where}: {name} consists of true and false, not of numbers")
     values = {name: numbers_of(f"{where}: {name}", column) for name, column in columns.items()}
     lengths = {len(column) for column in values.values()}
     if len(lengths) != 1 or not 0 < min(lengths) <= MAX_RUNS:

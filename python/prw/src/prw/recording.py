@@ -166,6 +166,8 @@ def read_columns(
     if len(called) < len(names):
         raise UserError(f"{names!r} names one column twice", argument="names")
     counted("skip", skip, 0)
+    if is_table(source) and (skip or encoding):
+        raise UserError("belongs to a file; this is a table in memory", argument="skip" if skip else "encoding")
 
     found = Columns([], {}, set(), [])
 

@@ -25,7 +25,7 @@ use std::process::ExitCode;
 
 /// The command line, with `fmu` as the first argument of cargo.
 #[derive(Parser)]
-#[command(name = "cargo", bin_name = "cargo", disable_help_subcommand = true)]
+#[command(name = "cargo", bin_name = "cargo")]
 enum Cargo {
     #[command(version, subcommand)]
     Fmu(Command),

@@ -112,7 +112,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--follow",
-        type=int,
+        type=_steps,
         nargs="?",
         const=3,
         default=0,
@@ -167,6 +167,15 @@ def run(arguments: argparse.Namespace) -> None:
     if not found.fits:
         raise DoesNotFit("the FMU does not explain the data; the parameters that were written are not reliable")
     show(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
+
+
+def _steps(string: str) -> int:
+    try:
+        return int(string)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{string!r} is not a number of steps; put files before --follow, or give the number"
+        ) from None
 
 
 def _quantum(string: str | None) -> float:

@@ -6,6 +6,7 @@ import argparse
 import inspect
 import math
 import re
+import shutil
 import sys
 import warnings
 from collections.abc import Callable
@@ -53,10 +54,11 @@ def add_paths(parser: argparse.ArgumentParser, out: str = "directory to write in
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
-    """Keeps the line breaks of descriptions and examples, at a width of 110 characters."""
+    """Keeps the line breaks of descriptions and examples. Lines have at most 110 characters, fewer in a narrower terminal."""
 
     def __init__(self, prog: str):
-        super().__init__(prog, max_help_position=30, width=110)
+        width = shutil.get_terminal_size((112, 24)).columns - 2
+        super().__init__(prog, max_help_position=30, width=min(width, 110))
 
 
 def add_task_options(parser: argparse.ArgumentParser) -> None:
