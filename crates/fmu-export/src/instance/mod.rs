@@ -372,17 +372,19 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Returns the number of values of these variables together. In FMI 3.0, a value reference may denote an array.
+    /// Returns the number of values of these variables together. In FMI 3.0, a value reference may denote an array. Fails at the first
+    /// reference without a variable, and at an element of an array.
     pub fn count_elements<R: Reference>(&self, vr: &[R]) -> Outcome<usize> {
         if !(M::ARRAYS && R::ARRAYS) {
             return Ok(vr.len());
         }
         let mut count = 0;
         for index in vr.iter().map(|vr| vr.index()) {
-            if M::TABLE.get(index as usize).is_some_and(|of| of.element() > 0) {
-                return self.reject_index(index);
+            match self.find(index) {
+                Some(of) if of.element() == 0 => count += of.length(),
+                // More may follow than the importer's array has, if the length is wrong.
+                _ => return self.reject_index(index),
             }
-            count += elements_of::<M>(index).count();
         }
         Ok(count)
     }

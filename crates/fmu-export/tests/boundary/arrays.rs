@@ -112,8 +112,29 @@ fn partial_derivatives_of_arrays() {
     fmu.rejected_with(&["there are 9 unknowns, the array has 2 elements"], |_| {
         call(&mut [0.0; 2], PIECES + 1)
     });
+    // A wrong number of references is noticed at the first one that is not of a variable.
+    let (wrong, many, mut found) = ([vr(Name::T), u32::MAX], 1 << 40, [f64::NAN; PIECES]);
+    let (knowns, result, unknown) =
+        (wrong.as_ptr(), found.as_mut_ptr(), "no variable with value reference 4294967295");
+    for [of, with] in [[many, 1], [1, many]] {
+        fmu.rejected_with(&[unknown], |fmu| {
+            fmu.fmi3GetDirectionalDerivative(
+                wrong.as_ptr(),
+                of,
+                knowns,
+                with,
+                seed.as_ptr(),
+                PIECES,
+                result,
+                PIECES,
+            )
+        });
+    }
 
     let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
+    fmu.rejected_with(&[unknown], |fmu| {
+        fmu.fmi3GetOutputDerivatives(wrong.as_ptr(), many, [1; 2].as_ptr(), result, PIECES)
+    });
     let (vr, mut rates) = ([vr(Name::means), vr(Name::T)], [f64::NAN; PIECES + 2]);
     fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, [1, 1].as_ptr(), rates.as_mut_ptr(), PIECES + 2));
     assert_eq!(rates[2..], reals::<PIECES>(&fmu, &[Name::der_T]));
