@@ -141,8 +141,8 @@ impl System {
         all.map(|(place, value)| Ok((self.0.existing(place)?, self.0.name_of(place), value)))
     }
 
-    /// Returns what was strange when the system was opened: values that are not converted because a unit is not defined, and values that are
-    /// not used because they have no variable.
+    /// Returns what was strange when the system was opened: values that are not converted because a unit is not defined, and values,
+    /// elements and attributes that are not used because they have no variable or no meaning.
     pub fn warnings(&self) -> &[String] {
         &self.0.warnings
     }
