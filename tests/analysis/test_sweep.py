@@ -77,6 +77,8 @@ def test_dask_cluster(prw, tmp_path):
         ([], "nothing varies; give --grid, --random, --identified or --table"),
         (["--grid", "k1=1:2"], "--grid k1=1:2: write NAME=LOW:HIGH:N"),
         (["--grid", "k1=1:2:1"], "--grid k1=1:2:1: write NAME=LOW:HIGH:N, with an integer N of at least 2, or NAME="),
+        (["--grid", "k1=1_0:20:2"], "--grid k1=1_0:20:2: write NAME=LOW:HIGH:N"),
+        (["--random", "k1=1_0%"], "--random k1=1_0%: '1_0' is not a finite number above 0"),
         (["--grid", "M=3:5:2"], "M, N are integers, which a sweep does not vary"),
         (["--grid", "k1=1:2:2", "--runs", "30"], "--runs 30: is for random draws; give a distribution (random)"),
         (["--grid", "k1=1:2:2", "--sampling", "sobol"], "--sampling sobol: is for random draws; give a distribution"),

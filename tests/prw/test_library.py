@@ -246,7 +246,10 @@ def test_wrong_motions() -> None:
         ((time, theta, [[0.0, 0.0]]), r"omega has the shape \(1, 2\)"),
         (([1.0, 1.0], theta), "time must increase"),
         (([0.0, float("nan")], theta), "time must increase"),
-        ((["now", "then"], theta), "time does not consist of numbers"),
+        ((["now", "then"], theta), "time: does not consist of numbers"),
+        ((["0", "1_0"], theta), "time: does not consist of numbers; convert strings and Booleans first"),
+        ((time, [[False, 0.0], [1.0, 1.0]]), "theta: does not consist of numbers; convert strings and Booleans first"),
+        ((time, np.array(theta) + 1j), "theta: has complex numbers; choose their real part or magnitude"),
     ]:
         with pytest.raises(prw.UserError, match=message):
             prw.Motion(*arguments)  # type: ignore[arg-type]
@@ -293,6 +296,24 @@ def test_wrong_sweeps(testbed: Path) -> None:
             {"grid": {"k1": [1.0]}, "random": {"k1": 0.1}},
             "k1 is in more than one of grid, random and parameters; choose one",
         ),
+        (
+            {"random": {"k1": (100.0, 0.1)}, "parameters": {"k1": 50.0}},
+            "k1 is in more than one of grid, random and parameters; choose one",
+        ),
+        ({"grid": [("k1", [1.0])]}, "grid: .* is not a mapping from parameters to values"),
+        ({"grid": {"k1": ["100", "1_00"]}}, "k1 must have one or more finite numbers as values, not"),
+        ({"grid": {"k1": [True, 100.0]}}, "k1 must have one or more finite numbers as values, not"),
+        ({"grid": {"k1": np.array([1j])}}, "k1 must have one or more finite numbers as values, not"),
+        ({"grid": {"k1": np.ma.array([1.0], mask=[True])}}, "k1 must have one or more finite numbers as values, not"),
+        (
+            {"grid": {"k1": (["1.9"], "N.m/deg")}},
+            r"k1 is \(\['1.9'\], 'N.m/deg'\); write finite numbers and their unit",
+        ),
+        ({"random": {"k1": True}}, "random: k1 True is not a finite number above 0"),
+        ({"random": {"k1": ("uniform", False, True)}}, r"random: k1 .* write \(.uniform., low, high\)"),
+        ({"random": {"k1": ()}}, r"random: k1 \(\): write a fraction as in 0.1, or \(value, fraction\)"),
+        ({"random": {"k1": ("lognormal",)}}, r"random: k1 \(\): write a fraction as in 0.1"),
+        ({"random": {"k1": 0.1}, "runs": True}, "runs True: must be an integer of at least 1"),
         ({"grid": {"k1": None}}, "k1 must have one or more finite numbers as values, not None"),
         ({"random": {"k1": -0.1}}, "random: k1 -0.1 is not a finite number above 0"),
         ({"random": {"k1": None}}, "random: k1 None is not a finite number above 0"),
@@ -340,6 +361,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(written["A"], prw.linearize({"k1": 90.0}, fmu=testbed).A)
     assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
     for wrong, message in (
+        ("k1=1_00", "--set k1=1_00: '1_00' is not a number"),
         ("k1", "--set k1: write NAME=VALUE"),
         ("k2=1,k1=1,5", "--set k2=1,k1=1,5: write NAME=VALUE; a comma begins the next one, so decimals need a point"),
         ("k1=stiff", "--set k1=stiff: 'stiff' is not a number"),

@@ -111,7 +111,12 @@ def test_measured_columns_are_compared(prw: Any, tmp_path: Path) -> None:
 
 def test_other_parameters(prw: Any, tmp_path: Path) -> None:
     """Parameters have their own units in the file that identification writes, and SI units in --set, which has precedence."""
-    entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
+    entries = {
+        "k1": {"value": 2.0, "unit": "N.m/deg"},
+        "c3": {"value": 0.2, "unit": "N.m.s/rad"},
+        "N": {"value": 9, "unit": "1"},
+        "k2": 77.0,
+    }
     (tmp_path / "mine.json").write_text(json.dumps(entries))
     (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))
     (tmp_path / "good.csv").write_text(GOOD.replace("0.002,0.1", "0.002,0.12") + "0.01,0.12,0.2\n")
@@ -135,6 +140,8 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
             'mine.json: k1 can be given in N.m/rad or N.m/deg, not in "N.m/rev"',
         ),
         ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
+        ({"k1": {"value": 1.0, "unit": "1"}}, 'mine.json: k1 can be given in N.m/rad or N.m/deg, not in "1"'),
+        ({"fmu": {}, "identified": False, "parameters": entries}, "mine.json: reports that the data did not determine"),
         ([1.0], "--parameters: mine.json is not a JSON file with values by name"),
         (
             {"k1": {"value": 1.0, "units": "N.m/deg"}},

@@ -8,7 +8,7 @@ import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import fmu_run
 import numpy as np
@@ -43,23 +43,35 @@ def check_names(argument: str, names: Iterable[str], known: Collection[str], oth
 
 def counted(argument: str, value: Any, least: int = 1) -> int:
     """The value as an int. Raises UserError unless it is an integer of at least `least`."""
-    if not isinstance(value, Integral) or value < least:
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise UserError(f"must be an integer of at least {least}", argument=argument, given=repr(value))
     return int(value)
 
 
 def positive(argument: str, value: Any, name: str = "") -> float:
     """The value as a float. Raises UserError unless it is finite and above 0. name: the parameter or channel that has the value."""
-    if not isinstance(value, Real) or not 0 < float(value) < math.inf:
+    if not is_real(value) or not 0 < float(value) < math.inf:
         raise UserError(f"{name} {value!r} is not a finite number above 0".lstrip(), argument=argument)
     return float(value)
 
 
 def not_negative(argument: str, value: Any, name: str = "") -> float:
     """The value as a float. Raises UserError unless it is finite and 0 or above. name: the parameter that has the value."""
-    if not isinstance(value, Real) or not 0 <= float(value) < math.inf:
+    if not is_real(value) or not 0 <= float(value) < math.inf:
         raise UserError(f"{name} {value!r} is not a finite number of at least 0".lstrip(), argument=argument)
     return float(value)
+
+
+def flag(argument: str, value: Any) -> bool:
+    """The value as a bool. Raises UserError unless it is a Boolean, because Python takes "no" for true."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise UserError("must be True or False", argument=argument, given=repr(value))
+    return bool(value)
+
+
+def is_real(value: Any) -> TypeGuard[float]:
+    """Whether the value is a number, which Python says of Booleans, too."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
@@ -101,41 +113,63 @@ def is_table(given: Any) -> bool:
 
 def columns_of(table: Any) -> dict[str, Any]:
     """The columns of a DataFrame (of pandas, polars, ...) or a dict of arrays; a named index becomes the first
-    column."""
+    column. Raises UserError if a column has the name of the index, but other values."""
     names = table.keys() if hasattr(table, "keys") else table.columns
     index = getattr(getattr(table, "index", None), "name", None)
+    if index is not None and index in names and not np.array_equal(np.asarray(table.index), np.asarray(table[index])):
+        raise UserError(f"the index and a column of the table are both called {index}; rename or remove one")
     first = {} if index is None or index in names else {str(index): table.index}
     return first | {str(name): table[name] for name in names}
 
 
 def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
-    """The values as a column (n,) of floats; masked and missing values become NaN. Raises UserError, with a message that begins with
-    `where`, if they are not numbers or not one column."""
+    """The values as a column (n,) of floats, as `floats_of`. Raises UserError also if they are not one column."""
+    array = floats_of(where, values)
+    if array.ndim != 1:
+        raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
+    return array
+
+
+def floats_of(where: str, values: Any) -> NDArray[np.float64]:
+    """The values as an array of floats; masked and missing values become NaN. Raises UserError, with a message that begins with
+    `where`, if they are not numbers."""
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
         raise UserError(f"{where}: is a pair of values and a unit, but must be a column of numbers")
     try:
-        masked = isinstance(values, np.ma.MaskedArray)
-        array = values.astype(np.float64).filled(np.nan) if masked else np.asarray(values)
-        dates = array.dtype.kind in "mM"
+        array = np.asarray(values)
+        kind = array.dtype.kind
+        missing = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
         # pandas.NA cannot be converted.
-        if array.dtype.kind == "O" and hasattr(values, "isna"):
-            array = np.where(values.isna(), np.nan, array)
-        # numpy would convert "1_000" and True.
-        texts = (
-            array.dtype.kind in "USTb"
-            or array.dtype.kind == "O"
-            and any(isinstance(x, (str, bytes, bool)) for x in array.flat)
-        )
-        array = np.zeros(len(array)) if dates else array.astype(np.float64)
+        if kind == "O" and hasattr(values, "isna"):
+            missing = values.isna()
+        if kind == "O" and missing is not None:
+            array = np.where(missing, np.nan, array)
+        # numpy would convert "1_000" and True, and a Boolean in a list is a number in the array.
+        listed = isinstance(values, (list, tuple))
+        each = np.asarray(values, dtype=object).flat if kind == "O" or listed else ()
+        texts = kind in "USTb" or any(isinstance(x, (str, bytes, bool, np.bool_)) for x in each)
+        dates = kind in "mM"
+        array = np.zeros(array.shape) if dates or kind == "c" else array.astype(np.float64)
+        if missing is not None:
+            array[missing] = np.nan
     except (TypeError, ValueError) as error:
         raise UserError(f"{where}: does not consist of numbers ({error})") from None
     if texts:
         raise UserError(f"{where}: does not consist of numbers; convert strings and Booleans first")
+    if kind == "c":
+        raise UserError(f"{where}: has complex numbers; choose their real part or magnitude")
     if dates:
         raise UserError(f"{where}: has dates or durations; write seconds as numbers")
-    if array.ndim != 1:
-        raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
     return array
+
+
+def finite_numbers(values: Any) -> NDArray[np.float64] | None:
+    """One number or a column of numbers as a column, or None if they are not that, or not finite."""
+    try:
+        found = numbers_of("", values if np.ndim(values) else [values])
+    except ValueError:
+        return None
+    return found if np.isfinite(found).all() else None
 
 
 #: Values by name, in the FMU's units (SI for the testbed) or as (value, unit), or the path of a JSON file with them.
@@ -175,6 +209,12 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
         return {name: _value(path, name, entry, loaded, False) for name, entry in content.items()}
     # In the report of an identification, which names its FMU, the parameters are one member of several.
     report = "fmu" in content
+    if report and content.get("identified", True) is not True:
+        raise UserError(
+            f"{path}: reports that the data did not determine the parameters, or that the FMU does not explain the data; if you want "
+            "its values nevertheless, give them by name",
+            argument="parameters",
+        )
     for name in content:
         if name != "parameters" and (name in loaded.variables or not report):
             raise UserError(f'{path}: {name} is outside of "parameters"; move it there', argument="parameters")
@@ -201,14 +241,11 @@ def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu, where: str = "") -> 
         raise UserError(f"{where}{name} is {value!r}, not a number", argument="parameters")
     if not pair:
         return value
-    try:
-        numbers = np.asarray(value[0], dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.array(np.nan)
-    if not np.isfinite(numbers).all():
+    numbers = finite_numbers(value[0])
+    if numbers is None:
         raise UserError(f"{where}{name} is {value!r}; write finite numbers and their unit", argument="parameters")
     try:
-        return loaded.converted(name, numbers if numbers.ndim else value[0], value[1])
+        return loaded.converted(name, numbers if np.ndim(value[0]) else numbers[0], value[1])
     except ValueError as error:
         raise UserError(f"{where}{error}", argument="parameters") from None
 
@@ -226,4 +263,7 @@ def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu, report: bool)
                 )
     if not isinstance(value, (int, float)):
         raise UserError(f"{path}: {name} is {value!r}, not a number", argument="parameters")
-    return in_own_unit(name, value if unit in ("", "1") else (value, unit), loaded, f"{path}: ")
+    known = loaded.variables.get(name)
+    # Numbers without a unit, such as those of lobes, have the unit 1 in files.
+    own = unit == "" or (unit == "1" and known is not None and known.unit is None)
+    return in_own_unit(name, value if own else (value, unit), loaded, f"{path}: ")

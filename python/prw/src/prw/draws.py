@@ -8,7 +8,6 @@ import math
 import os
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -20,8 +19,10 @@ from prw.arguments import (
     check_names,
     columns_of,
     counted,
+    finite_numbers,
     in_own_unit,
     is_path,
+    is_real,
     is_table,
     numbers_of,
     spread_of,
@@ -219,8 +220,10 @@ def layout(
     starts = {**testbed.starts, **fixed}
     _check("grid", grid, testbed)
     _check("random", drawn, testbed)
+    # A value in `fixed` is the median of a distribution that has none of its own.
+    centred = {*drawn} if isinstance(random, Joint) else {name for name in drawn if _has_median(random[name])}
     for name in (*grid, *drawn):
-        if (name in grid) + (name in drawn) + (name in fixed and name in grid) > 1:
+        if (name in grid) + (name in drawn) + (name in fixed and (name in grid or name in centred)) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not drawn:
         raise UserError("nothing varies; give values of a parameter (grid), its distribution (random) or a table")
@@ -262,14 +265,20 @@ def _scores(sampling: str, parameters: int, draws: int, combinations: int, seed:
     return np.asarray(ndtri(np.clip(shares, 2.0**-60, 1 - 2.0**-53)))
 
 
+def _has_median(spread: Spread) -> bool:
+    """Whether a distribution consists of more than a relative standard deviation."""
+    return isinstance(spread, Sequence) and (len(spread) != 2 or not isinstance(spread[0], str))
+
+
 def _drawn(name: str, spread: Spread, start: float, scores: Array) -> Array:
     """Convert standard normal draws (count,) to another distribution, see `sweep`. Raises UserError for an invalid one."""
-    kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
+    named = isinstance(spread, tuple) and spread and isinstance(spread[0], str)
+    kind, *numbers = spread if named else ("lognormal", spread)  # type: ignore[misc]
     if kind == "lognormal":
-        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
+        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) != 1 else numbers[0], start)
         return median * np.exp(relative * scores)
-    finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
-    one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
+    finite = len(numbers) == 2 and all(is_real(n) and math.isfinite(float(n)) for n in numbers)
+    one, other = map(float, numbers) if finite else (math.nan, math.nan)
     if kind == "uniform" and one < other:
         from scipy.special import ndtr
 
@@ -283,11 +292,8 @@ def _drawn(name: str, spread: Spread, start: float, scores: Array) -> Array:
 
 
 def _column(name: str, values: Any) -> Array:
-    try:
-        column = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    except (TypeError, ValueError):
-        column = np.empty(0)
+    column = finite_numbers(values)
     # The range is not checked here: if the FMU rejects a value, only the runs with this value fail.
-    if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
+    if column is None or not len(column):
         raise UserError(f"{name} must have one or more finite numbers as values, not {values!r}")
     return column

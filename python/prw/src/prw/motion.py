@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from prw.arguments import floats_of
 from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 
@@ -135,7 +136,4 @@ def unwrapped(name: str, time: Array, angle: Array) -> tuple[Array, str]:
 def _numbers(name: str, value: object) -> Array:
     if np.ma.is_masked(value):
         raise UserError(f"motion: {name} has masked values; fill or remove them")
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise UserError(f"motion: {name} does not consist of numbers ({error})") from None
+    return floats_of(f"motion: {name}", value)

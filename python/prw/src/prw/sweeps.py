@@ -149,6 +149,8 @@ def sweep(
             if isinstance(joint, Joint):
                 fixed = {**{n: v for n, v in joint.others.items() if n not in (grid or {})}, **fixed}
             testbed.with_starts(fixed)
+            if grid is not None and not hasattr(grid, "items"):
+                raise UserError(f"{grid!r} is not a mapping from parameters to values", argument="grid")
             if table is None:
                 values = layout(grid or {}, joint or {}, testbed=testbed, fixed=fixed, **draws)
             elif grid is not None or random is not None:

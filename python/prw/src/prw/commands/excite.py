@@ -14,7 +14,7 @@ import json
 import numpy as np
 
 from prw.arguments import positive
-from prw.commands.options import add_paths, add_task_options, call, listed, show
+from prw.commands.options import add_paths, add_task_options, call, decimal, listed, show
 from prw.errors import need
 from prw.files import write_table, write_text
 from prw.identification.excitation import excite
@@ -42,7 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         ("rate", 1000.0, "HZ", "samples per second"),
     ):
         about = f"{meaning} (default: %(default)g)"
-        parser.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=about)
+        parser.add_argument(f"--{name}", type=decimal, default=default, metavar=unit, help=about)
     add_task_options(parser)
     add_paths(parser, "directory of the motions and ranking.json", "excite")
 

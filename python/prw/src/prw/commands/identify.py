@@ -24,6 +24,7 @@ from prw.commands.options import (
     add_task_options,
     bounds,
     call,
+    integer,
     listed,
     number,
     show,
@@ -124,9 +125,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-offsets", dest="offsets", action="store_false", help="the sensors have no offsets")
     parser.add_argument(
-        "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
+        "--starts", type=integer, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
+    parser.add_argument("--seed", type=integer, default=0, help="of the random starting points (default: %(default)s)")
     add_paths(parser, "directory of report.html, report.json, identified.json and identified.ssv", "identified")
 
 
@@ -171,7 +172,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _steps(string: str) -> int:
     try:
-        return int(string)
+        return integer(string)
     except ValueError:
         raise argparse.ArgumentTypeError(
             f"{string!r} is not a number of steps; put files before --follow, or give the number"

@@ -105,7 +105,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--skip-lines",
         dest="skip",
-        type=int,
+        type=integer,
         default=0,
         metavar="N",
         help="lines above the header, as dSPACE writes them",
@@ -157,6 +157,20 @@ class Named(argparse.Action):
         setattr(namespace, self.dest, found)
 
 
+def decimal(string: str) -> float:
+    """A number in one of the spellings that tables have: Python would also take 1_000. Raises ValueError."""
+    if "_" in string:
+        raise ValueError(f"{string!r} is not a number")
+    return float(string)
+
+
+def integer(string: str) -> int:
+    """An integer in one of the spellings that tables have. Raises ValueError."""
+    if "_" in string:
+        raise ValueError(f"{string!r} is not an integer")
+    return int(string)
+
+
 def number(string: str) -> float:
     """A positive number. Raises ValueError."""
     value = finite(string)
@@ -176,7 +190,7 @@ def not_negative(string: str) -> float:
 def finite(string: str) -> float:
     """The number in the string, or NaN if there is none or it is not finite."""
     try:
-        value = float(string)
+        value = decimal(string)
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan
@@ -219,7 +233,7 @@ def parameters_of(arguments: argparse.Namespace) -> dict[str, Any]:
 def value(string: str) -> float | bool:
     """A number, or `true` or `false`. Raises ValueError."""
     try:
-        return string == "true" if string in ("true", "false") else float(string)
+        return string == "true" if string in ("true", "false") else decimal(string)
     except ValueError:
         raise ValueError(f"{string!r} is not a number") from None
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_OUT, FMU, Named, add_unit_options, call, listed, show, spread
+from prw.commands.options import DEFAULT_OUT, FMU, Named, add_unit_options, call, decimal, integer, listed, show, spread
 from prw.draws import SAMPLINGS
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
@@ -42,7 +42,7 @@ def _steps(string: str) -> Array:
     """N even values from LOW to HIGH. Raises ValueError."""
     parts = string.split(":")
     try:
-        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        low, high, count = decimal(parts[0]), decimal(parts[1]), integer(parts[2])
         if len(parts) != 3 or count < 1 + (low != high) or not np.isfinite([low, high]).all():
             raise ValueError
     except (ValueError, IndexError):
@@ -68,7 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--runs",
-        type=int,
+        type=integer,
         metavar="N",
         help=f"draws of --random or --identified for each combination of --grid (default: {DRAWS['runs']})",
     )
@@ -87,7 +87,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--again", type=Path, metavar="FILE", help="a runs.parquet whose sweep is repeated, and compared with it"
     )
-    parser.add_argument("--seed", type=int, help=f"of the draws (default: {DRAWS['seed']})")
+    parser.add_argument("--seed", type=integer, help=f"of the draws (default: {DRAWS['seed']})")
     parser.add_argument(
         "--sampling",
         choices=SAMPLINGS,
@@ -102,7 +102,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--trajectories",
-        type=int,
+        type=integer,
         metavar="N",
         help="also write every Nth sample of the outputs into the directory trajectories",
     )
@@ -113,8 +113,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="motor recording, as for `prw simulate` (default: the motion of Fig. 4)",
     )
     add_unit_options(parser, "the recording is")
-    parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
-    parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
+    parser.add_argument("--threads", type=integer, metavar="N", help="on this machine (default: one per core)")
+    parser.add_argument("--workers", type=integer, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
     parser.add_argument("--fmu", type=Path, help=FMU)
     parser.add_argument(

@@ -27,7 +27,18 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
-from prw.arguments import Table, check_names, counted, is_path, is_table, names_of, not_negative, positive, spread_of
+from prw.arguments import (
+    Table,
+    check_names,
+    counted,
+    flag,
+    is_path,
+    is_table,
+    names_of,
+    not_negative,
+    positive,
+    spread_of,
+)
 from prw.columns import ANGLES, CHANNELS
 from prw.errors import UserError, need
 
@@ -182,6 +193,7 @@ def identify(
     from prw.simulation import Run
 
     starts, seed, follow = counted("starts", starts), counted("seed", seed, 0), counted("follow", follow, 0)
+    offsets, robust = flag("offsets", offsets), flag("robust", robust)
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
