@@ -85,6 +85,18 @@ BAD = {
         b"time;theta1;theta2;tau1\n0;0.1;0.1;1\n0.1;0.1;0.1;\n0.2;0.1;0.1;1,542\n",
         "row 4: decimal commas and decimal points are mixed from here on",
     ),
+    "a quote that swallows rows": (
+        b'time,theta1,theta2,note\n0,1,1,a\n1,1,1,"b\n2,1,1,c\n3,1,1,d"\n4,1,1,e\n',
+        "row 3: a cell in quotes does not end in this row; close its quote, or write it in one row",
+    ),
+    "a quote that is not closed": (
+        b'time,theta1,theta2\n0,1,1\n1,1,"1\n',
+        "row 3: a cell in quotes does not end in this row",
+    ),
+    "counts that are no number": (
+        "time,theta1 [rev/\u00b2],theta2\n0,1,1\n1,1,1\n".encode(),
+        "row 1, column theta1: theta1 cannot be in 'rev/\u00b2'",
+    ),
     "wrong unit of torque": (
         b"time,theta1,theta2,tau1 [deg]\n0,1,1,1\n1,1,1,1\n",
         "column tau1: tau1 cannot be in 'deg'; use N.m, mN.m",
@@ -117,6 +129,7 @@ def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
         b'\xef\xbb\xbf# log\n"SEP=|"\n\n' + GOOD.replace(",", "|").encode(),
         GOOD.replace(",", " , ").encode(),
         b'"time","theta1","theta2"\n0,"0.1",0.2\n0.001,0.1,0.2\n0.002,0.1,0.2',
+        b'# of the rig, "Anna\n' + GOOD.encode(),
         b"\n" + GOOD.encode() + b"\n\n",
         GOOD.encode() + b"  \t \n",
         GOOD.encode() + b" ,, \n,,\n",
@@ -132,6 +145,7 @@ def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
         "sep=|",
         "spaces",
         "quotes",
+        "a quote in a comment",
         "blank lines",
         "a line of blanks",
         "lines of blank cells",
@@ -289,6 +303,10 @@ ROWS = "\n".join(f"{t},{1 - np.cos(3 * t)},{np.rad2deg(3 * np.sin(3 * t))},0,0" 
             "theta1 jumps by 4 rad after 0 s; angles must continue past a full turn",
         ),
         ("theta2\n0,0,0\n10,0.1,0\n20,0.2,0\n", "a sample every 10 s; if time is in ms, call its column time [ms]"),
+        (
+            "theta2\n1700000000.001,0,0\n1700000000.002,0,0\n1700000000.003,0,0\n",
+            "time reaches 1.7e+09 s, where it can only be resolved to 2.4e-07 s, 0.00024 of a step; subtract the first",
+        ),
         ("omega1,theta2,omega2\n" + ROWS, "omega1 adds up to 57.3 times the motion of theta1"),
     ],
 )
@@ -352,7 +370,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     masked = table | {"tau1": np.ma.array([1, 9, 2, 3], mask=[False, True, False, False])}
     integers = pandas.array([1, None, 2, 3], dtype="Int64")
     nullable, mixed = frame.assign(tau1=integers), frame.assign(tau1=integers.astype(object))
-    for source in (table, masked, frame, frame.set_index("time"), nullable, mixed):
+    for source in (table, masked, frame, frame.set_index("time"), frame.set_index("time", drop=False), nullable, mixed):
         recording = read(source)
         for name in ("time", "theta1", "theta2", "tau1"):
             np.testing.assert_array_equal(recording[name], from_file[name])
@@ -370,6 +388,13 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta2": ["0", "1_000"]}, "theta2: does not consist of numbers; convert strings"),
         ({**good, "theta2": pandas.Series([0, "1"])}, "theta2: does not consist of numbers; convert strings"),
         ({**good, "theta2": [False, True]}, "theta2: does not consist of numbers; convert strings and Booleans"),
+        ({**good, "theta2": [False, 1.0]}, "theta2: does not consist of numbers; convert strings and Booleans"),
+        ({**good, "theta2": np.array([np.True_, 1.0], dtype=object)}, "theta2: does not consist of numbers; convert"),
+        ({**good, "theta2": np.ma.array(["0", "1_000"])}, "theta2: does not consist of numbers; convert strings"),
+        ({**good, "theta2": np.ma.array([True, False])}, "theta2: does not consist of numbers; convert strings"),
+        ({**good, "theta2": np.array([0.0, 1j])}, "theta2: has complex numbers; choose their real part"),
+        ({**good, "time": np.ma.array([0, 1], dtype="m8[s]")}, "column time: has dates"),
+        (pandas.DataFrame(good, index=pandas.Index([0.0, 2.0], name="time")), "the index and a column .* called time"),
         ({**good, "theta2": pandas.array([0, None], dtype="Int64")}, "theta2: nan at index 1 is not finite"),
         ({**good, "theta2": ([0.0, 1.0], "deg")}, "recording, column theta2: is a pair of values and a unit"),
         ({**good, "theta2": [[0.0], [1.0, 2.0]]}, "recording, column theta2: does not consist of numbers"),
@@ -385,7 +410,12 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     for source, message in wrong:
         with pytest.raises(UserError, match=message):
             read(source)
-    options: list[dict[str, Any]] = [{"skip": 1}, {"encoding": "latin-1"}]
-    for option in options:
-        with pytest.raises(UserError, match="belongs to a file; this is a table in memory"):
+    options: list[tuple[dict[str, Any], str]] = [
+        ({"skip": 1}, "belongs to a file; this is a table in memory"),
+        ({"encoding": "latin-1"}, "belongs to a file; this is a table in memory"),
+        ({"skip": True}, "skip True: must be an integer of at least 0"),
+        ({"degrees": "no"}, "degrees 'no': must be True or False"),
+    ]
+    for option, message in options:
+        with pytest.raises(UserError, match=message):
             read(good, **option)

@@ -70,7 +70,8 @@ def factor(name: str, unit: str) -> float:
     """The factor from `unit` to SI for column `name`. A unit may be divided, as in rev/10000 for the counts of an
     encoder. Raises UserError for an unknown unit or a unit of another quantity."""
     whole, slash, count = unit.partition("/")
-    if slash and count.strip().isdigit() and int(count) > 0:
+    # Other characters, such as ², are digits for Python, too, but not numbers.
+    if slash and count.strip().isdecimal() and int(count) > 0:
         return factor(name, whole) / int(count)
     known = UNITS[QUANTITIES[name]]
     spelt = unit.strip().replace("·", ".").replace("*", ".").replace(" ", ".")
@@ -147,7 +148,7 @@ def columns(
         found[name] = index
         try:
             given = (units or {}).get(name, "")
-            chosen[name] = _unit(name, unit, given, bool(degrees))
+            chosen[name] = unit_of(name, unit, given, bool(degrees))
             if degrees is None and not unit and not given:
                 assumed.add(name)
         except UserError as error:
@@ -191,7 +192,9 @@ def column(title: str) -> tuple[str, str]:
     return name, next(filter(None, match.groups()[1:]), "").strip()
 
 
-def _unit(name: str, in_header: str, given: str, degrees: bool) -> str:
+def unit_of(name: str, in_header: str, given: str, degrees: bool = False) -> str:
+    """The unit of column `name`: the one in its header, the one that is `given`, or the default. Raises UserError if the first two
+    differ, or for a unit of another quantity."""
     if in_header and given and factor(name, in_header) != factor(name, given):
         raise UserError(f"the header has the unit {in_header}, but `units` has {given}")
     default = si_unit(name)

@@ -18,6 +18,8 @@ PLAUSIBLE_ANGLE = 4 * np.pi
 SMALL_MOVE = 0.02
 #: Mean time between two samples in s above which the unit is probably wrong: milliseconds that are read as seconds.
 SLOW_SAMPLING = 0.5
+#: Distance of neighbouring floats at the last time, as a fraction of the usual time between two samples, above which it matters for rates.
+COARSE = 1e-4
 #: Rows are missing if the time between two rows is more than this multiple of the median.
 MISSING = 5.0
 #: Gap in s above which the motion of a moving motor cannot be interpolated, so that the recording is rejected.
@@ -59,6 +61,12 @@ def notes_on_values(path: Path, time: Array, theta: Array, omega: Array | None, 
     notes = []
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
         notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
+    latest = np.abs(time).max()
+    if (share := float(np.spacing(latest) / np.median(np.diff(time)))) > COARSE:
+        notes.append(
+            f"time reaches {latest:.4g} s, where it can only be resolved to {np.spacing(latest):.2g} s, {share:.2g} of a step; subtract the "
+            "first time from all times"
+        )
     for side, name in enumerate(ANGLES):
         # A percentile, because a single step of a coarse encoder is not a speed.
         speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from prw.arguments import Table, check_names, columns_of, counted, is_path, is_table, numbers_of
+from prw.arguments import Table, check_names, columns_of, counted, flag, is_path, is_table, numbers_of
 from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion, unwrapped
@@ -166,6 +166,8 @@ def read_columns(
     if len(called) < len(names):
         raise UserError(f"{names!r} names one column twice", argument="names")
     counted("skip", skip, 0)
+    if degrees is not None:
+        degrees = flag("degrees", degrees)
     if is_table(source) and (skip or encoding):
         raise UserError("belongs to a file; this is a table in memory", argument="skip" if skip else "encoding")
 

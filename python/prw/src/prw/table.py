@@ -87,7 +87,7 @@ def _parse(
         raise UserError(f"{path}: the file is empty; a header and {needed}")
     delimiter = separator[1] if separator else next((d for d in DELIMITERS if d in first), ",")
     file.seek(0)
-    table = csv.reader(_lines(path, file), delimiter=delimiter, skipinitialspace=True)
+    table = csv.reader(_lines(path, file, begin), delimiter=delimiter, skipinitialspace=True)
     try:
         # The first row below `begin` lines.
         top = next((row for row in table if row and table.line_num > begin), None)
@@ -107,12 +107,15 @@ def _parse(
     return values
 
 
-def _lines(path: Path, file: IO[str]) -> Iterator[str]:
-    """The lines of the file. Raises UserError for one that would fill the memory."""
+def _lines(path: Path, file: IO[str], begin: int) -> Iterator[str]:
+    """The lines of the file; the first `begin` are replaced by blank ones, because a quote in a comment is not the beginning of a cell.
+    Raises UserError for a line that would fill the memory."""
+    number = 0
     while line := file.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
             raise UserError(f"{path}: a line has more than {LONGEST_LINE:,} characters; it is not a table")
-        yield line
+        number += 1
+        yield line if number > begin else "\n"
 
 
 def _top(file: IO[str], skip: int) -> tuple[int, str]:
@@ -139,17 +142,22 @@ def _rows(
 ) -> Array:
     """All rows below the header, (rows, columns). width: cells of the header. size: bytes of the file."""
     cells, previous, bytes_read, indices = array("d"), -math.inf, 0, [index for _, index in columns]
-    comma = table.dialect.delimiter == ";"
+    comma, last = table.dialect.delimiter == ";", table.line_num
     marks: set[str] = set()
     with Progress(f"reading {path}", size) as progress:
         for count, row in enumerate(table):
+            line = "".join(row)
+            if "\n" in line or "\r" in line:
+                raise UserError(
+                    f"{_where(path, last + 1)}: a cell in quotes does not end in this row; close its quote, or write it in one row"
+                )
+            last = table.line_num
             # Some tools end each row, but not the header, with a separator.
             if len(row) != width and not (len(row) == width + 1 and not row[-1].strip()):
                 if not any(map(str.strip, row)) or row[0].startswith("#"):
                     continue
                 number = "1 cell" if len(row) == 1 else f"{len(row)} cells"
                 raise UserError(f"{_where(path, table.line_num)}: {number}, but the header has {width}")
-            line = "".join(row)
             try:
                 values = [float(row[i].replace(",", ".") if comma else row[i]) for i in indices]
             except ValueError:
