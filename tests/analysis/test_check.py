@@ -185,6 +185,12 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
     path = write_csv(tmp_path / "both.csv", both)
     assert prw.check(path, fmu=fmu).agrees
     assert not prw.check(path, component="other", fmu=fmu).agrees
+    mixed = {**both, "pitch": right["pitch"], "roll [deg]": np.rad2deg(right["roll"])}
+    found = prw.check(write_csv(tmp_path / "mixed.csv", mixed), fmu=fmu)
+    assert found.agrees
+    assert (
+        "the outputs are of several components: pitch of none, roll of testbed; `component` chooses one" in found.notes
+    )
     path = write_csv(tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]})
     with pytest.raises(
         prw.UserError, match="component: there are several roll in .*, of the components a, b; name one"
@@ -263,13 +269,16 @@ def test_results_that_show_too_little(prw, right, tmp_path, change, reason):
         ("time,roll [N.m]\n0,1\n1,2\n", "column roll: roll cannot be in 'N.m'"),
         ("time,theta1\n0,0\n1,0\n", "has none of the outputs tau1"),
         ("time,roll,roll\n0,1,1\n1,2,3\n", "two columns are called roll"),
+        ("time,roll [rad],roll [deg]\n0,1,1\n1,2,2\n", "roll [rad], roll [deg] have different values of roll; rename"),
+        ("time,pitch [deg]\n0,1\n1,2\n", "column pitch: the header has the unit deg, but `units` has rad"),
+        ("time,roll\n0,1\n1,2\n", "no column pitch, whose unit is given; there are time, roll"),
     ],
 )
 def test_tables_that_cannot_be_read(fmu, tmp_path, text, message):
     path = tmp_path / "run.csv"
     path.write_text(text)
     with pytest.raises(prw.UserError) as caught:
-        prw.check(path, fmu=fmu)
+        prw.check(path, units={"pitch": "rad"} if "unit" in message else {}, fmu=fmu)
     assert str(path) in str(caught.value) and message in str(caught.value)
 
 
@@ -337,6 +346,12 @@ def test_mat_files_that_cannot_be_read(fmu, tmp_path):
             {"a": {"time": ramp, "signals": np.array([{"values": x, "label": "roll"} for x in (ramp, -ramp)])}},
             "two columns are called roll",
         ),
+        (
+            {"time": ramp, "pitch": ramp, "roll": ramp + 1j},
+            r"roll is of type complex128 and shape \(9,\); save it as a",
+        ),
+        ({"time": ramp, "pitch": ramp, "roll": np.ones((9, 2))}, r"roll is of type float64 and shape \(9, 2\)"),
+        ({"time": ramp, "pitch": ramp, "a": {"roll": "none"}}, r"a.roll is of type <U4 and shape \(\); save it as a"),
     ]:
         savemat(path, variables)
         with pytest.raises(prw.UserError, match=message):

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from prw.arguments import flag
 from prw.testbed import existing_fmu
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def check(
     component
         The name before the dot, if columns of several components have the same name (default: `testbed`).
     units
-        Unit by name.
+        Unit by name, of columns whose names have none.
     fmu
         The FMU with the experiments (default: the testbed's).
 
@@ -60,7 +61,8 @@ def check(
     from prw.checking.experiments import find, read_experiments
     from prw.checking.result import read_result
 
+    way = "ModelExchange" if flag("model_exchange", model_exchange) else "CoSimulation"
     known = read_experiments(existing_fmu(fmu))
     chosen = None if experiment is None else find(known, experiment)
     found = read_result(Path(result), units, component)
-    return compare(found, chosen or nearest(found, known), "ModelExchange" if model_exchange else "CoSimulation")
+    return compare(found, chosen or nearest(found, known), way)

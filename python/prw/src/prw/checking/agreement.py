@@ -265,6 +265,10 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
         notes.append(f"the result has only {span} of the experiment's 0 to {experiment.stop_time:g} s")
     if bare.missing:
         notes.append(f"not in the result: {', '.join(bare.missing)}")
+    owners = {name: result.owners.get(name, "") for name in bare.found}
+    if len({*owners.values()}) > 1:
+        each = ", ".join(f"{name} of {owner or 'none'}" for name, owner in owners.items())
+        notes.append(f"the outputs are of several components: {each}; `component` chooses one")
     if not bare.far:
         return notes
     for name in MOTORS:

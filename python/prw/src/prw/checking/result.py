@@ -7,14 +7,15 @@ import os
 import re
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from prw.arguments import check_names
-from prw.columns import NAMES, QUANTITIES, column, factor, shown, si_unit
+from prw.columns import NAMES, QUANTITIES, column, factor, shown, unit_of
 from prw.errors import UserError, need
 from prw.motion import Array
 from prw.table import read_table
@@ -50,12 +51,15 @@ class Result:
         (n,) by name in `prw.columns.QUANTITIES`.
     unknown
         Names of the other columns of the same components.
+    owners
+        The component of each of `values` whose title has one.
     """
 
     source: Path
     time: Array
     values: Mapping[str, Array]
     unknown: tuple[str, ...] = ()
+    owners: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_result(path: Path, units: Mapping[str, str], component: str | None) -> Result:
@@ -65,7 +69,7 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
     if not path.is_file():
         raise UserError(f"{path}: no such file")
     columns = _mat(path) if path.suffix.lower() == ".mat" else _csv(path)
-    chosen = _choose(path, columns, units, component)
+    chosen, owners = _choose(path, columns, units, component)
     if "time" not in chosen:
         raise UserError(f"{path}: there is no column time; it has {shown(list(columns))}")
     time = chosen.pop("time")
@@ -78,7 +82,8 @@ def read_result(path: Path, units: Mapping[str, str], component: str | None) -> 
     if (np.diff(time) < 0).any():
         raise UserError(f"{path}: time runs backwards after {time[np.argmax(np.diff(time) < 0)]:g} s")
     last = np.append(np.diff(time) > 0, True)
-    return Result(path, time[last], {name: values[last] for name, values in chosen.items()}, tuple(_unknown(columns)))
+    values = {name: column[last] for name, column in chosen.items()}
+    return Result(path, time[last], values, tuple(_unknown(columns)), owners)
 
 
 def _unknown(titles: Collection[str]) -> Iterator[str]:
@@ -92,14 +97,15 @@ def _unknown(titles: Collection[str]) -> Iterator[str]:
 
 def _choose(
     path: Path, columns: Mapping[str, Array], units: Mapping[str, str], component: str | None
-) -> dict[str, Array]:
-    """The known columns in SI, by their names in QUANTITIES. Raises UserError if the component is unclear or a unit is wrong."""
-    candidates: dict[str, list[tuple[str, str, Array]]] = {}
-    for title, values in columns.items():
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """The known columns in SI, by their names in QUANTITIES, and their components. Raises UserError if the column or the component is
+    unclear, a unit is wrong, or a unit is given for a column that does not exist."""
+    candidates: dict[str, list[tuple[str, str, str]]] = {}
+    for title in columns:
         owner, name, unit = _known(title)
         if name:
-            candidates.setdefault(name, []).append((owner, unit, values))
-    found = {}
+            candidates.setdefault(name, []).append((owner, title, unit))
+    found, owners = {}, {}
     for name, same in candidates.items():
         wanted = [c for c in same if re.split(r"[./:|]", c[0])[-1].lower() == (component or TESTBED).lower()]
         if component is not None and name != "time":
@@ -108,19 +114,33 @@ def _choose(
             same = wanted or same
         if not same:
             continue
-        if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
-            owners = ", ".join(owner or "none" for owner, _, _ in same)
-            raise UserError(
-                f"there are several {name} in {path}, of the components {owners}; name one", argument="component"
-            )
-        _, unit, values = same[0]
         try:
-            found[name] = values * factor(name, unit or units.get(name, "") or si_unit(name))
+            in_si = [columns[title] * factor(name, unit_of(name, unit, units.get(name, ""))) for _, title, unit in same]
         except UserError as error:
             raise UserError(f"{path}, column {name}: {error}") from None
+        if not all(_equal(other, in_si[0]) for other in in_si):
+            components = {owner or "none": None for owner, _, _ in same}
+            if len(components) == 1:
+                titles = ", ".join(title for _, title, _ in same)
+                raise UserError(f"{path}: {titles} have different values of {name}; rename or remove all but one")
+            raise UserError(
+                f"there are several {name} in {path}, of the components {', '.join(components)}; name one",
+                argument="component",
+            )
+        owners[name], found[name] = same[0][0], in_si[0]
     if component is not None and not set(found) - {"time"}:
         raise UserError(f"{path}: the component {component} has no known column; there are {shown(list(columns))}")
-    return found
+    for name in units:
+        if name not in found:
+            raise UserError(f"{path}: no column {name}, whose unit is given; there are {', '.join(found)}")
+    return found, owners
+
+
+def _equal(one: Array, other: Array) -> bool:
+    """Whether two columns in SI have the same values, except for rounding errors of the conversion."""
+    if one.shape != other.shape:
+        return False
+    return bool((np.abs(one - other) <= 1e-12 * np.abs(one).max(initial=0.0)).all())
 
 
 def _known(title: str) -> tuple[str, str, str]:
@@ -174,10 +194,17 @@ def _mat(path: Path) -> dict[str, Array]:
     except Exception as error:
         raise UserError(f"{path}: cannot be read as a .mat file ({str(error) or type(error).__name__})") from None
     columns: dict[str, Array] = {}
+    others: dict[str, str] = {}
     for name, value in content.items():
         if not name.startswith("__"):
             for title, values in _of_variable(name, value):
-                _add(path, columns, title, values)
+                if values.ndim == 1 and len(values) > 1 and values.dtype.kind in "fiu":
+                    _add(path, columns, title, values.astype(np.float64))
+                else:
+                    others[_known(title)[1]] = f"{title} is of type {values.dtype} and shape {values.shape}"
+    there = {"", "time", *(_known(title)[1] for title in columns)}
+    if unlike := [what for name, what in others.items() if name not in there]:
+        raise UserError(f"{path}: {unlike[0]}; save it as a vector of real numbers")
     times = {name: len(values) for name, values in columns.items() if _is_time(name)}
     if not times:
         hint = "; save time and signals as vectors: save('run.mat', 'time', 'roll', ..., '-v7')"
@@ -252,9 +279,9 @@ def _is_time(title: str) -> bool:
     return title.rpartition(".")[2].lower() in ("time", "tout", "t")
 
 
-def _of_variable(name: str, value: Any) -> Iterator[tuple[str, Array]]:
-    """The columns in a variable of MATLAB, with their titles: a vector, a structure with vectors as fields, or a structure with time as
-    Simulink logs it (`time`, and `signals` with a label and values each). Other variables have no columns."""
+def _of_variable(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays in a variable of MATLAB, with their titles: a vector, a structure with vectors as fields, or a structure with time as
+    Simulink logs it (`time`, and `signals` with a label and values each). Arrays that are not vectors of numbers are not columns."""
     if hasattr(value, "_fieldnames"):
         for field in value._fieldnames:
             inner = getattr(value, field)
@@ -265,9 +292,7 @@ def _of_variable(name: str, value: Any) -> Iterator[tuple[str, Array]]:
             else:
                 yield from _of_variable(f"{name}.{field}", inner)
         return
-    array = np.asarray(value)
-    if array.ndim == 1 and len(array) > 1 and array.dtype.kind in "fiub":
-        yield name, array.astype(np.float64)
+    yield name, np.asarray(value)
 
 
 def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
