@@ -78,6 +78,18 @@ def test_steps_follow_the_noise() -> None:
         ({"parameters": "k9"}, "the FMU has no variable 'k9'"),
         ({"parameters": []}, "name at least one"),
         ({"parameters": "k1", "start": {"k1": [1.0, 2.0]}}, r"k1 has the shape \(2,\); sensitivities need one value"),
+        ({"parameters": "k1", "steps": {"k2": 1.0}}, "steps: 'k2' is not among the parameters k1"),
+        ({"parameters": "k1", "steps": {"k1": "1"}}, "steps: k1: '1' is not a number"),
+        ({"parameters": "k1", "measures": ["rms"]}, "measures are not differentiated; calculate them"),
+        (
+            {"parameters": "k1", "inputs": {"theta1": np.ones((12, 2))}},
+            r"inputs: theta1 has the shape \(12, 2\); sensitivities need the same for all runs",
+        ),
+        (
+            {"parameters": "k1", "inputs": {"theta1": ([0.0, 1.0], np.ones((12, 2)), "deg")}},
+            r"theta1 has the shape \(12, 2\)",
+        ),
+        ({"parameters": "k1", "start": {"k2": (np.ones(12), "N.m/deg")}}, r"start: k2 has the shape \(12,\); sensitiv"),
         ({"parameters": "c1", "steps": {"c1": 1e9}}, "c1 cannot be varied about .*c1 must not be below 0"),
     ],
 )

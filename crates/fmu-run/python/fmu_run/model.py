@@ -273,7 +273,7 @@ class Model:
         self,
         time: ArrayLike,
         *,
-        outputs: Sequence[str],
+        outputs: str | Sequence[str],
         parameters: str | Sequence[str],
         start: Mapping[str, Start] | None = None,
         steps: Mapping[str, float] = {},
@@ -296,7 +296,7 @@ class Model:
             The largest step of a parameter by name, in the unit of the FMU. Default: an eighth of its value. Five smaller steps are tried,
             the smallest of which is 1/1024 of the largest.
         others
-            Further arguments of `run`, such as `inputs`, `every` and `threads`.
+            Further arguments of `run`, such as `inputs`, `every` and `threads`. Inputs, like start values, are the same for all runs.
 
         Returns
         -------
@@ -316,7 +316,15 @@ class Model:
         >>> found["y", "k"], found.errors["y", "k"]
         """
         names = [parameters] if isinstance(parameters, str) else list(dict.fromkeys(parameters))
-        given, values = _items("start", start), {}
+        outputs = [outputs] if isinstance(outputs, str) else list(outputs)
+        given, values, largest = _items("start", start), dict[str, float](), dict[str, float]()
+        if "measures" in others:
+            raise ValueError("measures are not differentiated; calculate them from the trajectories")
+        if unknown := [name for name in steps if name not in names]:
+            raise ValueError(f"steps: {unknown[0]!r} is not among the parameters {', '.join(names)}")
+        self._check_one_run("start", {name: value for name, value in given.items() if name not in names})
+        for argument in ("inputs", "input_derivatives"):
+            self._check_one_run(argument, _items(argument, others.get(argument)))
         for name in names:
             if name not in self.variables:
                 raise ValueError(f"parameters: the FMU has no variable {name!r}")
@@ -335,17 +343,33 @@ class Model:
             if array.ndim != 0:
                 raise ValueError(f"start: {name} has the shape {array.shape}; sensitivities need one value")
             values[name] = float(array)
-            if not np.isfinite(found := steps.get(name, LARGEST * abs(values[name]))) or not found > 0:
+            step = numbers(f"steps: {name}", steps.get(name, LARGEST * abs(values[name])))
+            if step.ndim or not np.isfinite(step) or not step > 0:
                 raise ValueError(f"{name} is {values[name]:g}; give its largest step, as in steps={{{name!r}: 0.1}}")
+            largest[name] = float(step)
         if not names:
             raise ValueError("parameters: name at least one")
-        largest = {name: steps.get(name, LARGEST * abs(value)) for name, value in values.items()}
         return differentiate(
             lambda varied: self.run(time, outputs=outputs, start={**given, **varied}, **others),
             outputs,
             values,
             largest,
         )
+
+    def _check_one_run(self, argument: str, given: Mapping[str, Any]) -> None:
+        """Raise ValueError for a value that differs from run to run, because the runs differ in the parameters only."""
+        for name, value in given.items():
+            is_tuple = isinstance(value, tuple) and len(value) in (2, 3)
+            if is_tuple and isinstance(value[-1], str):  # (values, unit), or (times, values, unit)
+                value = value[-2]
+            elif is_tuple and argument != "start" and np.ndim(value[0]) and np.ndim(value[1]):  # (times, values)
+                value = value[1]
+            element = next((other for other in self.variables if other.startswith(f"{name}[")), None)
+            own = 0 if name in self.variables or element is None else element[len(name) :].count(",") + 1
+            if np.ndim(value) > own + (argument != "start"):
+                raise ValueError(
+                    f"{argument}: {name} has the shape {np.shape(value)}; sensitivities need the same for all runs"
+                )
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
         """Convert values to the unit of a variable.
