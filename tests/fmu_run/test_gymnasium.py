@@ -208,7 +208,7 @@ def test_draws_do_not_depend_on_the_number_of_environments(task) -> None:
     envs = VectorEnv(replace(task, **SENSED), 2)
     first, _ = envs.reset(seed=[1, 1])
     assert np.array_equal(first[0], first[1])
-    second, _ = envs.reset(seed=[1, 1], options={"reset_mask": np.array([True, False])})
+    second, _ = envs.reset(seed=np.array([1, 1]), options={"reset_mask": np.array([True, False])})
     assert np.array_equal(second, first)
     third, _ = envs.reset(seed=[None, 1])
     assert not np.array_equal(third[0], first[0]) and np.array_equal(third[1], first[1])
@@ -339,6 +339,22 @@ def test_inputs_from_actions(task) -> None:
         ({"drawn": {"k1": 100.0}}, "drawn: k1 needs .low, high., .* not 100"),
         ({"start": {"k1": 100.0}, "drawn": {"k1": (100.0, 120.0)}}, "drawn: k1 also has a value in start"),
         ({"length": 2.5}, "length must be an integer of at least 1"),
+        ({"length": True}, "length must be an integer of at least 1"),
+        ({"step": "0.1"}, "step: '0.1' is not a number"),
+        ({"failed_reward": "-1"}, "failed_reward: '-1' is not a number"),
+        ({"actions": {"theta1": ("-1", "1")}}, "actions: theta1: the values are not numbers"),
+        ({"actions": ("theta1", "theta1")}, "actions: theta1 is there twice"),
+        ({"observations": ("roll", "pitch", "roll")}, "observations: roll is there twice"),
+        ({"privileged": ("M", "M")}, "privileged: M is there twice"),
+        ({"inputs": ("theta1", "theta1"), "to_inputs": np.add}, "inputs: theta1 is there twice"),
+        ({"drawn": {"k1": ("100", "120")}}, "drawn: k1: the values are not numbers"),
+        ({"goals": {"k1": (0.0, 1.0)}}, "goals: k1 is among drawn; choose another name"),
+        ({"noise": {"roll": "1"}}, "noise: roll: '1' is not a number"),
+        ({"delays": {"roll": True}}, "delays: roll needs an integer of at least 0, not True"),
+        (
+            {"observations": ("theta1", "roll"), "delays": {"theta1": 1}},
+            "delays: theta1 is an observation and an action; choose another name for the action",
+        ),
     ],
 )
 def test_invalid_tasks(task, changed, message) -> None:
@@ -356,12 +372,35 @@ def test_invalid_results_of_functions(task) -> None:
             envs.step(np.zeros((2, 2)))
         with pytest.raises(ValueError, match=r"actions must be \(2, 2\), they are \(2,\)"):
             envs.step(np.zeros(2))
+        with pytest.raises(ValueError, match="actions: the values are not numbers"):
+            envs.step([["0", "1_0"], ["0", "0"]])
         with pytest.raises(ValueError, match=r"reset_mask must be \(2,\) of bool"):
             envs.reset(options={"reset_mask": [1, 0]})
-    envs = VectorEnv(replace(task, reward=lambda before, action, after: np.array([0.0, np.nan])), 2)
-    envs.reset()
-    with pytest.raises(ValueError, match="reward must return finite numbers, it returned nan in instance 1"):
-        envs.step(np.zeros((2, 2)))
+        with pytest.raises(ValueError, match="options: 'reset_masks' is not known; there is 'reset_mask'"):
+            envs.reset(options={"reset_masks": np.array([True, False])})
+        envs.close()
+        for call in (envs.reset, lambda envs=envs: envs.step(np.zeros((2, 2)))):
+            with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="the environment is closed"):
+                call()
+    with Env(task) as env, pytest.raises(ValueError, match="options: 'reset_mask' is not known; there are none"):
+        env.reset(options={"reset_mask": np.array([True])})
+    for name, values, message in [
+        ("reward", np.array([0.0, np.nan]), "reward must return finite numbers, it returned nan in instance 1"),
+        ("reward", np.array(["0", "1_0"]), "reward: the values are not numbers"),
+        ("reward", np.array([0.0, 1j]), "reward: the values are not numbers"),
+        ("terminated", np.array(["False", "False"]), "terminated must return Booleans, it returned <U5"),
+        ("terminated", np.array([np.nan, 0.0]), "terminated must return Booleans, it returned float64"),
+    ]:
+        envs = VectorEnv(replace(task, **{name: lambda before, action, after, values=values: values}), 2)
+        envs.reset()
+        with pytest.raises(ValueError, match=message):
+            envs.step(np.zeros((2, 2)))
+    for value, message in [
+        ("1", "goal: the values are not numbers"),
+        (np.nan, "goal: its function must return a finite"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            VectorEnv(replace(task, goals={"goal": lambda rng, value=value: value}), 2).reset()
     for count in (1, 2):
         drawn = iter(np.linspace(100, -1, count + 1)[1:])
         envs = VectorEnv(replace(task, drawn={"k1": lambda rng, drawn=drawn: next(drawn)}), count)

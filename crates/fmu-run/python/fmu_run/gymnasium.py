@@ -18,13 +18,14 @@ from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 import fmu_run
+from fmu_run._native import numbers
 
 __all__ = ["AutoresetMode", "Env", "Task", "VectorEnv"]
 
@@ -135,11 +136,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     _own: fmu_run.Fmu | fmu_run.System | None = None
 
     def __init__(self, task: Task, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP):
-        if not isinstance(task.length, int | np.integer) or task.length < 1 or not task.step > 0:
+        if not _is_integer(task.length) or task.length < 1 or not numbers("step", task.step) > 0:
             raise ValueError(
                 f"length must be an integer of at least 1 and step above 0, they are {task.length} and {task.step}"
             )
-        if not np.isfinite(task.failed_reward):
+        if not np.isfinite(numbers("failed_reward", task.failed_reward)):
             raise ValueError(f"failed_reward must be a finite number, it is {task.failed_reward}")
         if (task.inputs is None) != (task.to_inputs is None):
             raise ValueError("give inputs and to_inputs, or neither")
@@ -151,14 +152,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         try:
             actions = _bounds("actions", task.actions, fmu.variables)
             observations = _bounds("observations", task.observations, fmu.variables)
-            self._inputs, self._read = tuple(task.inputs or actions), (*observations, *task.privileged)
+            self._privileged = _named("privileged", task.privileged)
+            self._inputs = tuple(actions) if task.inputs is None else _named("inputs", task.inputs)
+            self._read = (*observations, *self._privileged)
             _check_sensors(task, actions, observations)
             for name in self._inputs:
                 if name in fmu.variables and (found := fmu.variables[name].causality) != "input":
                     raise ValueError(f"{name} is not an input, its causality is {found}")
             self._instances = fmu.instances(num_envs, start=task.start, threads=task.threads)
-            for names in (self._inputs, self._read):
-                self._instances.get(names)  # Raises for unknown names.
+            for name in (*self._inputs, *self._read):
+                # Raises for unknown names.
+                if self._instances.get((name,)).shape != (num_envs, 1):
+                    raise ValueError(f"{name} is an array; name its elements, such as {name}[1]")
         except Exception:
             self.close()
             raise
@@ -197,9 +202,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         -------
         (num_envs, observations), and an empty dict
         """
+        self._check_open()
+        if unknown := [name for name in options or {} if name != "reset_mask"]:
+            raise ValueError(f"options: {unknown[0]!r} is not known; there is 'reset_mask'")
         seeds = (
             list(seed)
-            if isinstance(seed, Sequence)
+            if isinstance(seed, Sequence | np.ndarray)
             else [None if seed is None else seed + k for k in range(self.num_envs)]
         )
         if len(seeds) != self.num_envs:
@@ -228,11 +236,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         -------
         observations (num_envs, observations), rewards, terminated and truncated (num_envs,), and infos
         """
+        self._check_open()
         before, renew = self._values, self._over.copy()
         if before is None or (self._mode is AutoresetMode.DISABLED and renew.any()):
             which = "all" if before is None else f"episodes {np.flatnonzero(renew).tolist()} are over"
             raise ResetNeeded(f"reset comes before step: {which}")
-        acting = np.asarray(actions, dtype=np.float64)
+        acting = numbers("actions", actions)
         if acting.shape != self.action_space.shape:
             raise ValueError(f"actions must be {self.action_space.shape}, they are {acting.shape}")
         applied = acting
@@ -241,7 +250,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             applied = self._late_actions.read()
         after, errors = self._advance(applied, before)
         self.steps += 1
-        rewards = self._judged("reward", self.task.reward(before, acting, after)).astype(np.float64)
+        rewards = self._judged("reward", numbers("reward", self.task.reward(before, acting, after)))
         rewards[list(errors)] = self.task.failed_reward
         if (unknown := np.flatnonzero(~np.isfinite(rewards) & ~renew)).size:
             raise ValueError(
@@ -250,7 +259,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         ends = self.task.terminated
         terminated = np.zeros(self.num_envs, dtype=bool)
         if ends is not None:
-            terminated = self._judged("terminated", ends(before, acting, after)).astype(bool)
+            terminated = self._judged("terminated", np.array(ends(before, acting, after)))
+            if terminated.dtype != bool:
+                raise ValueError(f"terminated must return Booleans, it returned {terminated.dtype}")
         terminated[list(errors)] = True
         truncated = self.steps >= self.task.length
         if self.task.delays:
@@ -285,7 +296,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         """Perform a step. Return the values after it, and the messages of instances whose step failed, by index."""
         read, values = np.full((self.num_envs, len(self._read)), np.nan), actions
         if self.task.to_inputs is not None:
-            values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
+            values = numbers("to_inputs", self.task.to_inputs(actions, self._instances.get(self._inputs)))
             if values.shape != (wanted := (self.num_envs, len(self._inputs))):
                 raise ValueError(f"to_inputs must return {wanted}, it returned {values.shape}")
         try:
@@ -304,6 +315,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         """Begin new episodes of the selected instances, and write their first values to `values`."""
         which = which.copy()  # It may be `self._over`, which changes below.
         indices = np.flatnonzero(which)
+        names = [*self.task.drawn, *self.task.goals]
         draws = [*self.task.drawn.values(), *self.task.goals.values()]
         ranges = np.flatnonzero([not callable(how) for how in draws])
         if len(ranges):
@@ -312,7 +324,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._drawn[np.ix_(indices, ranges)] = low + (high - low) * shares.reshape(-1, len(ranges))
         for column, how in enumerate(draws):
             if callable(how):
-                self._drawn[indices, column] = [float(how(self.generators[index])) for index in indices]
+                found = numbers(names[column], [how(self.generators[index]) for index in indices])
+                if found.shape != indices.shape or not np.isfinite(found).all():
+                    one = found[0] if found.shape != indices.shape else found[~np.isfinite(found)][0]
+                    raise ValueError(f"{names[column]}: its function must return a finite number, it returned {one}")
+                self._drawn[indices, column] = found
         start = {name: np.ascontiguousarray(self._drawn[:, column]) for column, name in enumerate(self.task.drawn)}
         try:
             self._instances.reset(which, start=start)
@@ -341,7 +357,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         """Insert the goals between the observations and the privileged variables."""
         if not self.task.goals:
             return read
-        count = len(self._read) - len(self.task.privileged)
+        count = len(self._read) - len(self._privileged)
         return np.hstack([read[:, :count], self._drawn[:, len(self.task.drawn) :], read[:, count:]])
 
     def _see(self, which: _Bools, values: _Array) -> None:
@@ -358,11 +374,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             deviations = np.array(list(self.task.noise.values()))
             self._seen[np.ix_(indices, self._noisy)] += deviations * self._noise[indices, block[indices]]
 
-    def _judged(self, name: str, values: ArrayLike) -> NDArray[Any]:
-        judged = np.asarray(values)
-        if judged.shape != (self.num_envs,):
-            raise ValueError(f"{name} must return ({self.num_envs},), it returned {judged.shape}")
-        return judged
+    def _judged(self, name: str, values: NDArray[Any]) -> NDArray[Any]:
+        if values.shape != (self.num_envs,):
+            raise ValueError(f"{name} must return ({self.num_envs},), it returned {values.shape}")
+        return values
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("the environment is closed")
 
 
 class _Late:
@@ -404,6 +423,8 @@ class Env(gymnasium.Env[_Array, _Array]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
         """Begin a new episode."""
+        if options:
+            raise ValueError(f"options: {next(iter(options))!r} is not known; there are none")
         super().reset(seed=seed)
         self._one.generators = [self.np_random]
         observation, info = self._one.reset()
@@ -412,7 +433,7 @@ class Env(gymnasium.Env[_Array, _Array]):
 
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
         """Perform a step. If the FMU rejects it, or if an observation is not finite, `info["error"]` contains the message."""
-        observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
+        observation, reward, terminated, truncated, info = self._one.step(np.asanyarray(action)[None])
         details = {name: values[0] for name, values in info.items() if not name.startswith("_")}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), details
 
@@ -435,27 +456,45 @@ def _check_sensors(task: Task, actions: Mapping[str, Any], observations: Mapping
     ):
         if unknown := [name for name in named if name not in known]:
             raise ValueError(f"{what}: {unknown[0]} is not among {', '.join(known)}")
+    if both := [name for name in task.delays if name in observations and name in actions]:
+        raise ValueError(
+            f"delays: {both[0]} is an observation and an action; choose another name for the action, with inputs and to_inputs"
+        )
     for name in task.goals:
-        if name in observations:
-            raise ValueError(f"goals: {name} is an observation; choose another name")
+        if name in observations or name in task.drawn:
+            what = "an observation" if name in observations else "among drawn"
+            raise ValueError(f"goals: {name} is {what}; choose another name")
     if twice := [name for name in task.drawn if name in task.start]:
         raise ValueError(f"drawn: {twice[0]} also has a value in start; give one of both")
     for what, draws in (("drawn", task.drawn), ("goals", task.goals)):
         for name, how in draws.items():
-            pair = None if callable(how) else np.asarray(how, dtype=float)
+            pair = None if callable(how) else numbers(f"{what}: {name}", how)
             if pair is not None and not (pair.shape == (2,) and np.isfinite(pair).all() and pair[0] <= pair[1]):
                 raise ValueError(f"{what}: {name} needs (low, high), low not above high, or a function, not {how}")
     for name, deviation in task.noise.items():
-        if not (np.isfinite(deviation) and deviation >= 0):
+        found = numbers(f"noise: {name}", deviation)
+        if found.ndim or not (np.isfinite(found) and found >= 0):
             raise ValueError(f"noise: {name} needs a finite number of at least 0, not {deviation}")
     for name, delay in task.delays.items():
-        if not isinstance(delay, int) or delay < 0:
+        if not _is_integer(delay) or delay < 0:
             raise ValueError(f"delays: {name} needs an integer of at least 0, not {delay!r}")
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _named(what: str, given: str | Sequence[str]) -> tuple[str, ...]:
+    """One name or several names as a tuple. Raises ValueError if one is there twice."""
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if twice := [name for k, name in enumerate(names) if name in names[:k]]:
+        raise ValueError(f"{what}: {twice[0]} is there twice")
+    return names
 
 
 def _bounds(what: str, named: _Named, variables: Mapping[str, fmu_run.Variable]) -> dict[str, tuple[float, float]]:
     if not isinstance(named, Mapping):
-        found = {name: variables.get(name) for name in ([named] if isinstance(named, str) else named)}
+        found = {name: variables.get(name) for name in _named(what, named)}
         named = {
             name: (
                 -np.inf if of is None or of.min is None else of.min,
@@ -464,7 +503,8 @@ def _bounds(what: str, named: _Named, variables: Mapping[str, fmu_run.Variable])
             for name, of in found.items()
         }
     for name, bounds in named.items():
-        if len(bounds) != 2 or not bounds[0] < bounds[1]:
+        pair = numbers(f"{what}: {name}", bounds)
+        if pair.shape != (2,) or not pair[0] < pair[1]:
             raise ValueError(f"{what}: {name} needs (low, high), low below high, not {bounds}")
     if not named:
         raise ValueError(f"{what}: name at least one variable")
