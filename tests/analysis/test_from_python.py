@@ -93,6 +93,9 @@ def test_either_version_of_fmi(recording, fmu, found):
         ),
         ({"parameters": {"c3": 0}, "priors": {"c3": 0.1}}, "priors: c3 starts at 0; write (value, fraction)"),
         ({"starts": 0}, "starts 0: must be an integer of at least 1"),
+        ({"bounds": {"J2": (0.001, 0.01)}}, "bounds: J2 is not estimated, so it needs no bounds; estimate it, or omit"),
+        ({"quantum": "1"}, "quantum: '1' is not a finite number of at least 0"),
+        ({"quantum": float("nan")}, "quantum: nan is not a finite number of at least 0"),
         ({"starts": True}, "starts True: must be an integer of at least 1"),
         ({"noise": {"tau1": True}}, "noise: tau1 True is not a finite number above 0"),
         ({"offsets": "no"}, "offsets 'no': must be True or False"),
@@ -138,14 +141,18 @@ def test_a_parameter_that_is_0(undamped, recording, experiment, fmu):
     assert estimated(0, **prior) == pytest.approx(estimated(start, **prior), rel=1e-6)
 
 
-def test_sources_that_are_not_recordings():
-    for files, message in (
-        (None, "None is not a recording"),
-        ([None], "None is not a recording"),
-        ([], "files: at least one is needed"),
+def test_sources_that_are_not_recordings(recording, fmu):
+    read, run = prw.read(recording), prw.simulate(fmu=fmu)
+    for files, options, message in (
+        (None, {}, "None is not a recording"),
+        ([None], {}, "None is not a recording"),
+        ([], {}, "files: at least one is needed"),
+        (read, {"units": {"tau1": "mN.m"}}, "units: is for files and tables, and these recordings were read before"),
+        ([read, run], {"degrees": False}, "degrees: is for files and tables"),
+        (run, {"skip": 1}, "skip: is for files and tables"),
     ):
         with pytest.raises(prw.UserError, match=message):
-            prw.identify(files)
+            prw.identify(files, **options)
 
 
 def test_columns_in_memory_and_one_name(recording, experiment, fmu):
@@ -163,3 +170,10 @@ def test_excite(fmu):
     assert 39 < np.rad2deg(max(np.abs(each.motion.theta).max() for each in ranking)) < 40.01
     with pytest.raises(prw.UserError, match="angle: None is not a finite number above 0"):
         prw.excite(angle=None, fmu=fmu)
+    with pytest.raises(prw.UserError, match="noise: pitch is not known; there are tau1"):
+        prw.excite("tau1", noise={"pitch": 0.1}, fmu=fmu)
+    same = [
+        prw.excite("tau1", estimate="k2", parameters={"k1": k1}, duration=2, rate=100, fmu=fmu)[0].expected_errors
+        for k1 in ((2.0, "N.m/deg"), 360 / np.pi)
+    ]
+    assert same[0] == pytest.approx(same[1])

@@ -194,10 +194,16 @@ def identify(
 
     starts, seed, follow = counted("starts", starts), counted("seed", seed, 0), counted("follow", follow, 0)
     offsets, robust = flag("offsets", offsets), flag("robust", robust)
+    quantum = not_negative("quantum", quantum)
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
         raise UserError("at least one is needed", argument="files")
+    if all(isinstance(each, (Recording, Run)) for each in several):
+        reading = {"units": units, "degrees": degrees is not None, "names": names, "skip": skip, "encoding": encoding}
+        for argument, chosen in reading.items():
+            if chosen:
+                raise UserError("is for files and tables, and these recordings were read before", argument=argument)
     places = {
         "delay": delay,
         "lag": lag,
@@ -344,6 +350,10 @@ def task_of(
     for name, frequency in hum.items():
         positive("hum", frequency, name)
     for name, span in bounds.items():
+        if name not in chosen:
+            raise UserError(
+                f"{name} is not estimated, so it needs no bounds; estimate it, or omit them", argument="bounds"
+            )
         if not isinstance(span, Sequence) or len(span) != 2:
             raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")
         if not positive("bounds", span[0], name) < positive("bounds", span[1], name):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prw.arguments import check_names, names_of, positive
+from prw.arguments import Given, check_names, names_of, positive, values_of
 from prw.columns import MEASURED
 from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
@@ -56,7 +56,7 @@ def excite(
     duration: float = 10.0,
     rate: float = 1000.0,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
-    parameters: Mapping[str, float] = {},
+    parameters: Given = None,
     noise: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> list[Excitation]:
@@ -102,6 +102,7 @@ def excite(
     duration, rate = positive("duration", duration), positive("rate", rate)
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
     check_names("measure", channels, MEASURED)
+    check_names("noise", noise, channels)
     if not channels:
         raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
     if not 4 * design.FADE <= duration <= MAX_SAMPLES / rate:
@@ -112,7 +113,8 @@ def excite(
         raise UserError(reason, argument="rate", given=f"{rate:g}")
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
-        task = task_of(model.known, estimate, parameters=parameters, noise=noise)
+        given = values_of(parameters, model.loaded)
+        task = task_of(model.known, estimate, parameters=given, noise=noise)
         known = {**design.DEFAULT_NOISE, **noise}
         assumed = {name: known[name] for name in channels}
         for motion in design.motions(model, task, limits, duration, rate, assumed):
