@@ -94,6 +94,10 @@ def test_transfer_matrices(testbed: Path) -> None:
     )
     np.testing.assert_array_equal(found.response_at_hz(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
     assert found.moved(RATES) == ("theta1", "theta2")
+    with pytest.raises(prw.UserError, match="rates: theta1, whose rate is omega1, is a rate itself"):
+        found.response_at_hz(1.0, {"omega1": "theta1", "theta1": "theta2"})
+    with pytest.raises(prw.UserError, match="frequency: does not consist of numbers; convert strings"):
+        found.response_at_hz(["1", "1_0"])
     with pytest.raises(prw.UserError, match="rates: omega9 is not an input; there are theta1, theta2"):
         found.transfer(1j, {"omega9": "theta1"})
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from prw.arguments import floats_of
 from prw.errors import UserError, need
 from prw.motion import Array
 
@@ -64,17 +65,20 @@ class StateSpace:
 
     def moved(self, rates: Mapping[str, str]) -> tuple[str, ...]:
         """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`. Raises UserError for names that are
-        not inputs."""
+        not inputs, and for an input that is both a rate and the input of which another one is the rate."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
                 raise UserError(f"{name} is not an input; there are {', '.join(self.inputs)}", argument="rates")
+        for rate, angle in rates.items():
+            if angle in rates:
+                raise UserError(f"{angle}, whose rate is {rate}, is a rate itself", argument="rates")
         return tuple(name for name in self.inputs if name not in rates)
 
     def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The response to sines, for frequencies (k,) in Hz: complex amplitudes of outputs per input, (k, p, m).
         rates: as for `transfer`. For frequencies in rad/s, use `transfer(1j * omega)`, or python-control with
         `to_control().frequency_response(omega)`."""
-        return self.transfer(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)), rates)
+        return self.transfer(2j * np.pi * np.atleast_1d(floats_of("frequency", frequency)), rates)
 
     def to_control(self) -> control.StateSpace:
         """Convert to python-control, with the signals' names. Raises UserError without the package `control`."""
