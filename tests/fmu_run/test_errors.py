@@ -328,13 +328,20 @@ def test_arguments_of_wrong_types_are_named(fmu, testbed):
 
 
 @pytest.mark.parametrize("flag", [True, 1, [0, 1], "true", np.array([True])])
-def test_an_input_without_effect_is_a_warning_once(testbed, flag):
+def test_an_input_without_effect_is_a_warning_once(testbed, flag, tmp_path):
     given = {"outputs": ["roll"], "inputs": {"theta1": 0.1, "omega1": 0.2}}
     time = [0.0, 0.1]
     with fmu_run.Fmu(testbed) as fmu, warnings.catch_warnings():
         warnings.simplefilter("error")
         fmu.run(time, **given, start={"use_omega": flag})
         fmu.run(time, **given, interface="model-exchange")
+
+        def without(name, content):
+            is_description = name == "modelDescription.xml"
+            return re.sub(b"(?s)<CoSimulation.*?(/>|</CoSimulation>)", b"", content) if is_description else content
+
+        with fmu_run.Fmu(repacked(Path(testbed), tmp_path / "exchange.fmu", without)) as exchange:
+            exchange.run(time, **given)
         message = "omega1 has no effect, because use_omega is false; add 'use_omega': True to start"
         with pytest.raises(UserWarning, match=message):
             fmu.run(time, **given, start={"use_omega": False})

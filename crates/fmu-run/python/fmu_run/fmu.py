@@ -43,6 +43,7 @@ class Fmu(Model):
         self.outputs = tuple(outputs)
         #: dict[str, bool]: whether the FMU has directional derivatives, by interface type.
         self.directional = dict(directional)
+        self._interfaces = self.directional.keys()
         #: dict[str, dict[str, str]]: attributes of the base unit (exponents, factor and offset, as strings), by the name of the unit.
         self.units = {name: dict(attributes) for name, attributes in units.items()}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import TracebackType
@@ -68,6 +68,8 @@ class Model:
     def __init__(self, loaded: Loaded):
         self._loaded = loaded
         self._variables = loaded.variables()
+        #: Interface types.
+        self._interfaces: Collection[str] = ("co-simulation",)
         #: Inputs about which `run` has warned.
         self._warned = set[str]()
 
@@ -243,7 +245,9 @@ class Model:
             clocks,
             hold,
         )
-        self._warn_of_unused(_items("inputs", inputs), _items("start", start), interface or "co-simulation")
+        # An FMU lists its interface types, and is integrated if it has only Model Exchange. Systems run in Co-Simulation.
+        default: Interface = "co-simulation" if "co-simulation" in self._interfaces else "model-exchange"
+        self._warn_of_unused(_items("inputs", inputs), _items("start", start), interface or default)
         runs, raised = Runs(*found[:-1]), found[-1]
         if isinstance(raised, KeyboardInterrupt):
             raise Interrupted(runs) from None
