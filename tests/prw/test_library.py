@@ -307,7 +307,7 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"grid": {"k1": np.ma.array([1.0], mask=[True])}}, "k1 must have one or more finite numbers as values, not"),
         (
             {"grid": {"k1": (["1.9"], "N.m/deg")}},
-            r"k1 is \(\['1.9'\], 'N.m/deg'\); write finite numbers and their unit",
+            r"grid: k1 is \(\['1.9'\], 'N.m/deg'\); write finite numbers",
         ),
         ({"random": {"k1": True}}, "random: k1 True is not a finite number above 0"),
         ({"random": {"k1": ("uniform", False, True)}}, r"random: k1 .* write \(.uniform., low, high\)"),

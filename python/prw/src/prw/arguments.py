@@ -230,24 +230,24 @@ def _without_repetitions(members: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu, where: str = "") -> Any:
+def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu, where: str = "", argument: str = "parameters") -> Any:
     """The value of a pair (value, unit), converted to the unit of the FMU's variable. Any other value, and the value of an unknown
-    variable, is returned unchanged. Raises UserError, with a message that begins with `where`, for a unit that cannot be converted,
-    or for a Boolean in place of a number."""
+    variable, is returned unchanged. Raises UserError for `argument`, with a message that begins with `where`, for a unit that cannot be
+    converted, or for a Boolean in place of a number."""
     if name not in loaded.variables:
         return value
     pair = isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)
     if isinstance(value[0] if pair else value, (bool, np.bool_)) and loaded.variables[name].type != "Boolean":
-        raise UserError(f"{where}{name} is {value!r}, not a number", argument="parameters")
+        raise UserError(f"{where}{name} is {value!r}, not a number", argument=argument)
     if not pair:
         return value
     numbers = finite_numbers(value[0])
     if numbers is None:
-        raise UserError(f"{where}{name} is {value!r}; write finite numbers and their unit", argument="parameters")
+        raise UserError(f"{where}{name} is {value!r}; write finite numbers and their unit", argument=argument)
     try:
         return loaded.converted(name, numbers if np.ndim(value[0]) else numbers[0], value[1])
     except ValueError as error:
-        raise UserError(f"{where}{error}", argument="parameters") from None
+        raise UserError(f"{where}{error}", argument=argument) from None
 
 
 def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu, report: bool) -> Any:

@@ -229,7 +229,9 @@ def layout(
         raise UserError("nothing varies; give values of a parameter (grid), its distribution (random) or a table")
     draws = counted("runs", runs) if drawn else 1
     counted("seed", seed, least=0)
-    axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
+    axes = {
+        name: _column(name, in_own_unit(name, values, testbed.loaded, argument="grid")) for name, values in grid.items()
+    }
     total = math.prod(map(len, axes.values())) * draws
     if total > MAX_RUNS:
         raise UserError(f"{total} runs are more than the limit of {MAX_RUNS}; give fewer values (grid) or draws (runs)")
