@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 from built import ROOT
 from lagrange import OUTPUTS, linear_model, table_1
@@ -301,6 +302,7 @@ def test_wrong_sweeps(testbed: Path) -> None:
             "k1 is in more than one of grid, random and parameters; choose one",
         ),
         ({"grid": [("k1", [1.0])]}, "grid: .* is not a mapping from parameters to values"),
+        ({"grid": pandas.DataFrame({"k1": [1.0]})}, "grid: .* is not a mapping from parameters to values"),
         ({"grid": {"k1": ["100", "1_00"]}}, "k1 must have one or more finite numbers as values, not"),
         ({"grid": {"k1": [True, 100.0]}}, "k1 must have one or more finite numbers as values, not"),
         ({"grid": {"k1": np.array([1j])}}, "k1 must have one or more finite numbers as values, not"),

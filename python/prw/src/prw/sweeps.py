@@ -149,7 +149,7 @@ def sweep(
             if isinstance(joint, Joint):
                 fixed = {**{n: v for n, v in joint.others.items() if n not in (grid or {})}, **fixed}
             testbed.with_starts(fixed)
-            if grid is not None and not hasattr(grid, "items"):
+            if grid is not None and not isinstance(grid, Mapping):
                 raise UserError(f"{grid!r} is not a mapping from parameters to values", argument="grid")
             if table is None:
                 values = layout(grid or {}, joint or {}, testbed=testbed, fixed=fixed, **draws)
