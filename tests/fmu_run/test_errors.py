@@ -39,6 +39,12 @@ def fmu(testbed):
         ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
         ({"start": {"k1": [1, 2]}, "inputs": {"theta1": np.zeros((3, 11))}}, "theta1 is given for 3 runs, k1 for 2"),
+        ({"start": {"k1": []}}, "k1 has no values; give one for each run"),
+        ({"inputs": {"theta1": (TIME, 1.0, "deg")}}, "theta1 has 11 times, but one value; give a value for each time"),
+        (
+            {"inputs": {"theta1": ([0.0, 0.0, 0.0], [0.0, 1.0, 2.0])}},
+            "theta1 has the time 0 three times; a jump has it twice",
+        ),
         ({"measures": ["pek"]}, 'there is no measure "pek"; there are min, max, peak, time_of_peak, mean, rms, end'),
         ({"every": 0}, "every must be at least 1, it is 0"),
         ({"threads": 0}, "threads must be at least 1, it is 0"),

@@ -147,6 +147,12 @@ def test_exact_values(made, tmp_path):
     two = fmu.instances(2, start={"wide": wide, "bytes": b"x\0", "label": ["one", "two"]})
     assert two.get("wide_out").tolist() == wide and two.get("bytes_out").tolist() == [b"x\0"] * 2
     two.set("wide", [2**62 + 1, 7])
+    with pytest.raises(
+        ValueError, match="integers that floating-point numbers do not have; set 64-bit integers by themselves"
+    ):
+        two.set(["wide", "u"], np.array([2**53 + 1, 0]))
+    with pytest.raises(ValueError, match="wide"):
+        two.set(["wide", "u"], [2.0**60, 0.0])
     two.set("label", "both", mask=[True, False])
     assert two.get("wide_out").tolist() == [2**62 + 1, 7] and two.get("echo").tolist() == ["both", "two"]
     assert two.texts("echo") == ["both", "two"]

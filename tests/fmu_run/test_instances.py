@@ -168,6 +168,7 @@ def test_invalid_arguments(testbed) -> None:
                 r"values has the shape \(2, 2\); it must be \(3, 2\), \(2,\) or a number",
             ),
             (lambda: wrists.set("theta1", [0.0, 1.0]), r"values has the shape \(2,\); it must be \(3,\) or a number"),
+            (lambda: wrists.set(["theta1", "theta1"], [1.0, 2.0]), "theta1 is twice among the variables"),
             (lambda: wrists.get(MOTORS, out=np.zeros((3, 3))), r"shape \(3, 2\)"),
             (lambda: wrists.get(MOTORS, out=np.zeros((2, 3)).T), "contiguous"),
             (lambda: wrists.get("theta1", out=np.zeros(3, dtype=np.float32)), "float64"),

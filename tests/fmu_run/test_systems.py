@@ -124,6 +124,23 @@ def test_invalid_connections(connections, order, message) -> None:
         fmu_run.System(fmus, connections, order=order)
 
 
+def test_a_connector_and_its_variable_are_not_set_together() -> None:
+    both = {"pitch_ref": 0.1, "controller.pitch_ref": 0.2}
+    loop = fmu_run.System(built("prw_closed_loop.ssp"))
+    pairs = loop.instances()
+    for call in (
+        lambda: loop.run([0.0, 1e-3], start=both, outputs=["pitch"]),
+        lambda: loop.run([0.0, 1e-3], inputs=both, outputs=["pitch"]),
+        lambda: pairs.set(list(both), [0.1, 0.2]),
+    ):
+        with pytest.raises(
+            ValueError, match="pitch_ref and controller.pitch_ref among the .* are the same variable; give one of them"
+        ):
+            call()
+    one, other = pairs.get(list(both))[0]
+    assert one == other == np.deg2rad(30.0)
+
+
 def test_connected_inputs_cannot_be_set() -> None:
     with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
         loop = fmu_run.System({"controller": controller, "testbed": testbed}, CONNECTIONS)

@@ -18,7 +18,8 @@ pub struct Selection {
     /// Whether all variables are Real and belong to one component, and each name denotes one variable, so that a row is passed to
     /// the FMU unchanged.
     is_direct: bool,
-    /// Reason why a caller cannot set the variables: one of them is read-only, a structural parameter or connected to an output.
+    /// Reason why a caller cannot set the variables: one of them is read-only, a structural parameter or connected to an output, or is
+    /// there twice.
     read_only: Option<String>,
 }
 
@@ -35,6 +36,27 @@ struct Group {
     /// in the unit: the index of the variable among the references, the change from the connector to the variable, and
     /// its inverse. Variables with the same value as their connector are not listed.
     changes: Vec<(usize, [Change; 2])>,
+}
+
+/// Fails if one of the variables already has another name among those in `known`, or the same name. Two names may denote one variable,
+/// such as a connector of a system and the variable that it feeds.
+pub(crate) fn apart<'a>(
+    known: &mut HashMap<Target, &'a str>,
+    name: &'a str,
+    found: &[Found],
+    list: &str,
+) -> Result<(), Error> {
+    let others: Vec<_> = found.iter().filter_map(|found| known.get(&Target::of(*found)).copied()).collect();
+    match others.first() {
+        Some(other) if *other == name => request(format!("{name} is twice among the {list}")),
+        Some(other) => {
+            request(format!("{other} and {name} among the {list} are the same variable; give one of them"))
+        }
+        None => {
+            known.extend(found.iter().map(|found| (Target::of(*found), name)));
+            Ok(())
+        }
+    }
 }
 
 /// Identifies a variable: component, type and value reference.
@@ -73,6 +95,11 @@ impl Selection {
             let of_type = |group: &Group| group.component == component && group.base == base;
             groups.iter().position(of_type).unwrap_or(groups.len())
         });
+    }
+
+    /// Forbids setting the variables, for this reason.
+    pub(crate) fn forbid(&mut self, reason: String) {
+        self.read_only.get_or_insert(reason);
     }
 
     /// Adds a name and all variables that it denotes. `known` maps component and type to the index of a group, which is faster than a
@@ -231,7 +258,9 @@ pub(crate) fn fits(name: &str, (base, standard): (BaseType, Standard), values: &
         }
         (BaseType::Boolean, _) => (0.0, 1.0),
         (BaseType::Enumeration, Standard::Fmi2) => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        (BaseType::Enumeration, Standard::Fmi3) => (1.0 - EXACT, EXACT),
+        // Larger integers may have been rounded before they came here. By itself, a 64-bit integer is set as an integer.
+        (BaseType::Enumeration, Standard::Fmi3) | (BaseType::Int64, _) => (1.0 - EXACT, EXACT),
+        (BaseType::UInt64, _) => (0.0, EXACT),
         (base, _) => match base.range() {
             Some((low, high)) => (low as f64, high as f64),
             None => return Ok(()),

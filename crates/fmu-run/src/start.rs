@@ -2,10 +2,11 @@
 
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
-use crate::selection::{Target, fits};
+use crate::selection::{Target, apart, fits};
 use crate::system::System;
 use fmi_abi::{BaseType, Value, boolean};
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Start value of a variable. A [string](Value::String) is the value of a string variable, the name of an item of an enumeration, or
 /// `true`, `false`, `1` or `0` for a Boolean.
@@ -55,12 +56,11 @@ impl<'a> StartValues<'a> {
 
     /// Checks the given start values. Each name may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
-        let mut all = Self::default();
-        for (index, (name, start)) in given.iter().enumerate() {
-            if given[..index].iter().any(|(before, _)| before == name) {
-                return request(format!("{name} is twice among the start values"));
-            }
-            all.put(Self::found(&system.find_startable(name)?, name, *start)?);
+        let (mut all, mut known) = (Self::default(), HashMap::new());
+        for (name, start) in given {
+            let found = system.find_startable(name)?;
+            apart(&mut known, name, &found, "start values")?;
+            all.put(Self::found(&found, name, *start)?);
         }
         Ok(all)
     }

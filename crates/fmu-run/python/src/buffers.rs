@@ -103,13 +103,32 @@ pub fn array_of<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<Bound<'
         false => error,
     })?;
     // Checks the type first, because NumPy would convert None to NaN and strings to numbers.
-    if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !"biuf".contains(&kind) {
         return Err(match array.getattr("ndim")?.extract::<usize>()? {
             0 => PyValueError::new_err(format!("{name}: {} is not a number", values.repr()?)),
             _ => no_numbers(""),
         });
     }
-    array.call_method1("astype", ("float64",))
+    let floats = array.call_method1("astype", ("float64",))?;
+    // Floating-point numbers cannot represent all integers beyond 2^53.
+    if "iu".contains(&kind) && array.getattr("size")?.is_truthy()? {
+        const EXACT: i64 = 1 << f64::MANTISSA_DIGITS;
+        let is_large = array.call_method0("max")?.gt(EXACT)? || array.call_method0("min")?.lt(-EXACT)?;
+        // Python compares its integers and floating-point numbers exactly.
+        let as_objects = |of: &Bound<'py, PyAny>| of.call_method1("astype", ("O",));
+        let are_equal = || {
+            py.import("numpy")?
+                .call_method1("array_equal", (as_objects(&array)?, as_objects(&floats)?))?
+                .is_truthy()
+        };
+        if is_large && !are_equal()? {
+            return Err(PyValueError::new_err(format!(
+                "{name} has integers that floating-point numbers do not have; set 64-bit integers by themselves"
+            )));
+        }
+    }
+    Ok(floats)
 }
 
 /// An array to which results are written: a new one, or one of the caller with a copy of its values.

@@ -90,6 +90,11 @@ impl Signals {
         (own_times, times): (Option<Arc<Numbers>>, usize),
     ) -> PyResult<()> {
         let (given, sizes) = (values.shape(), array.map_or(&[][..], |array| &array.sizes));
+        if own_times.is_some() && given.is_empty() {
+            return Err(PyValueError::new_err(format!(
+                "{name} has {times} times, but one value; give a value for each time, or only the value"
+            )));
+        }
         let has_sizes = given.ends_with(sizes);
         let (by_time, by_run) = match given.len().checked_sub(sizes.len()) {
             _ if given.is_empty() => (false, false),

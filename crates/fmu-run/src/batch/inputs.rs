@@ -6,10 +6,11 @@ use super::{Batch, Trajectory};
 use crate::description::Variable;
 use crate::error::{Error, request};
 use crate::lookup::{Found, article, is_exact};
-use crate::selection::{Selection, fits};
+use crate::selection::{Selection, apart, fits};
 use crate::system::System;
 use fmi_abi::{BaseType, Standard, Variability};
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// Numeric inputs and their values.
 #[derive(Default)]
@@ -26,11 +27,11 @@ pub(super) fn each_input<'a, 's>(
     exact: &mut Vec<Input>,
     mut numeric: impl FnMut(&'a str, Trajectory<'a>, Vec<Found<'s>>) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let mut names = Vec::new();
+    let mut known = HashMap::new();
     for (name, trajectory) in batch.inputs.iter().filter(|(name, _)| !system.is_clocked(name)) {
         let variables = system.find(name)?;
         input_of(name, &variables)?;
-        once(&mut names, name, "inputs")?;
+        apart(&mut known, name, &variables, "inputs")?;
         if is_exact(variables[0].variable.base) {
             exact.push(Input::of(name, &variables, *trajectory, batch.time)?);
         } else {

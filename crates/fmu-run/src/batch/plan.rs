@@ -188,6 +188,9 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
         });
     let starts = batch.start.iter().filter_map(|(name, start)| Some((*name, start.count()?, 1)));
     for (name, length, times) in trajectories.chain(starts) {
+        if length == 0 {
+            return request(format!("{name} has no values; give one for each run"));
+        }
         if times == 0 || length % times != 0 {
             return request(format!(
                 "{name} has {length} values, which is not a multiple of the {times} times"

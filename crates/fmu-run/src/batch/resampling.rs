@@ -27,6 +27,10 @@ impl Resampling {
             let [before, after] = [times[index], times[index + 1]].map(shown_number);
             return request(format!("the times of {name} decrease: {after} follows {before}"));
         }
+        if let Some(three) = times.windows(3).find(|three| three[0] == three[2]) {
+            let time = shown_number(three[0]);
+            return request(format!("{name} has the time {time} three times; a jump has it twice"));
+        }
         let times: Vec<_> = times.iter().map(|time| rounded_to(points, *time)).collect();
         let at = points.iter().map(|point| {
             let after = times.partition_point(|time| time <= point);
@@ -101,9 +105,12 @@ mod tests {
 
     #[test]
     fn wrong_times() {
-        for (times, why) in
-            [(&[][..], "no times"), (&[0.0, f64::NAN], "must be finite"), (&[0.0, 1.0, 0.5], "decrease")]
-        {
+        for (times, why) in [
+            (&[][..], "no times"),
+            (&[0.0, f64::NAN], "must be finite"),
+            (&[0.0, 1.0, 0.5], "decrease"),
+            (&[0.0, 0.5, 0.5, 0.5], "u has the time 0.5 three times"),
+        ] {
             assert!(
                 Resampling::of("u", times, &[0.0, 1.0]).is_err_and(|error| error.to_string().contains(why))
             );

@@ -79,6 +79,11 @@ impl Integration {
                 return request(format!("{name} is {}; it must be above 0 and finite", shown_number(value)));
             }
         }
+        if self.solver == Solver::Rk4 && (self.rtol.is_some() || self.atol.is_some()) {
+            return request(
+                "rtol and atol have no effect with rk4, whose steps are fixed; choose max_step, or another solver".to_owned(),
+            );
+        }
         match self.rtol {
             Some(rtol) if !(1e-13..1.0).contains(&rtol) => {
                 request(format!("rtol is {}; it must be at least 1e-13 and below 1", shown_number(rtol)))
