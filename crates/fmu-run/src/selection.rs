@@ -38,23 +38,35 @@ struct Group {
     changes: Vec<(usize, [Change; 2])>,
 }
 
-/// Fails if one of the variables already has another name among those in `known`, or the same name. Two names may denote one variable,
-/// such as a connector of a system and the variable that it feeds.
-pub(crate) fn apart<'a>(
-    known: &mut HashMap<Target, &'a str>,
-    name: &'a str,
-    found: &[Found],
-    list: &str,
-) -> Result<(), Error> {
-    let others: Vec<_> = found.iter().filter_map(|found| known.get(&Target::of(*found)).copied()).collect();
-    match others.first() {
-        Some(other) if *other == name => request(format!("{name} is twice among the {list}")),
-        Some(other) => {
-            request(format!("{other} and {name} among the {list} are the same variable; give one of them"))
+/// Variables that get values, to find one that gets two. Two names may denote one variable, such as a connector of a system and the
+/// variable that it feeds.
+#[derive(Default)]
+pub(crate) struct Assigned<'a> {
+    /// Variables and their names, each with the number of the name.
+    all: Vec<(Target, usize, &'a str)>,
+    count: usize,
+}
+
+impl<'a> Assigned<'a> {
+    pub fn add(&mut self, name: &'a str, found: &[Found]) {
+        self.all.extend(found.iter().map(|found| (Target::of(*found), self.count, name)));
+        self.count += 1;
+    }
+
+    /// Fails if a variable is there twice.
+    pub fn check(mut self, list: &str) -> Result<(), Error> {
+        if self.count < 2 {
+            return Ok(());
         }
-        None => {
-            known.extend(found.iter().map(|found| (Target::of(*found), name)));
-            Ok(())
+        self.all.sort_unstable_by_key(|(of, number, _)| (of.reference, of.base as u8, of.component, *number));
+        match self.all.windows(2).find(|two| two[0].0 == two[1].0 && two[0].1 != two[1].1) {
+            Some([(.., one), (.., other)]) if one == other => {
+                request(format!("{one} is twice among the {list}"))
+            }
+            Some([(.., one), (.., other)]) => {
+                request(format!("{one} and {other} among the {list} are the same variable; give one of them"))
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -2,11 +2,10 @@
 
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
-use crate::selection::{Target, apart, fits};
+use crate::selection::{Assigned, Target, fits};
 use crate::system::System;
 use fmi_abi::{BaseType, Value, boolean};
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 /// Start value of a variable. A [string](Value::String) is the value of a string variable, the name of an item of an enumeration, or
 /// `true`, `false`, `1` or `0` for a Boolean.
@@ -56,12 +55,13 @@ impl<'a> StartValues<'a> {
 
     /// Checks the given start values. Each name may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
-        let (mut all, mut known) = (Self::default(), HashMap::new());
+        let (mut all, mut known) = (Self::default(), Assigned::default());
         for (name, start) in given {
             let found = system.find_startable(name)?;
-            apart(&mut known, name, &found, "start values")?;
+            known.add(name, &found);
             all.put(Self::found(&found, name, *start)?);
         }
+        known.check("start values")?;
         Ok(all)
     }
 

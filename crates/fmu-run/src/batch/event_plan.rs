@@ -1,15 +1,17 @@
 //! Checks the clocks and clocked variables of a batch, and what else it needs to handle events in Co-Simulation.
 
 use super::Batch;
-use super::inputs::{Inputs, checked, input_of, once};
+use super::inputs::{Inputs, checked, input_of};
 use super::series::Series;
 use crate::clocks::{Clock, Clocks, Fraction, Group, Held, Source};
 use crate::description::Description;
 use crate::error::{Error, request};
 use crate::lookup::{Found, is_exact};
+use crate::selection::Assigned;
 use crate::system::System;
 use fmi_abi::description::{Timing, Variable as Declared};
 use fmi_abi::{Causality, Interface, IntervalVariability};
+use std::collections::HashSet;
 
 /// The part of a plan for an FMU with clocks, and for events in Co-Simulation.
 pub(super) struct EventPlan<'a> {
@@ -72,17 +74,17 @@ impl<'a> EventPlan<'a> {
     }
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
-        let mut names = Vec::new();
+        let mut known = Assigned::default();
         for (name, trajectory) in &batch.inputs {
             let Some(found) = system.find_clocked(name) else { continue };
-            once(&mut names, name, "inputs")?;
+            known.add(name, &[found]);
             input_of(name, &[found])?;
             check_number(name, found)?;
             let base = (found.variable.base, found.description.standard);
             add(&mut self.clocks.inputs, &self.clocks.all, (name, found), self.values.len())?;
             self.values.push(checked(name, base, *trajectory, true, batch.time)?);
         }
-        Ok(())
+        known.check("inputs")
     }
 
     /// Returns the clocked inputs of a run.
@@ -141,9 +143,11 @@ fn indices(clocks: &[Clock], references: &[u32], name: &str) -> Result<Vec<usize
 
 /// Returns the clocks of an FMU. Triggered input clocks have the times that the caller gives.
 fn clocks_of<'a>(description: &Description, batch: &'a Batch) -> Result<Vec<Clock<'a>>, Error> {
-    let mut given = Vec::new();
+    let mut given = HashSet::new();
     for (name, times) in &batch.clocks {
-        once(&mut given, name, "clocks")?;
+        if !given.insert(name) {
+            return request(format!("{name} is twice among the clocks"));
+        }
         let is_own =
             |of: &Declared| of.name == *name && !of.is_time_based() && of.causality == Causality::Input;
         if !description.written_clocks().any(is_own) {

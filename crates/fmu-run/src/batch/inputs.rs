@@ -6,11 +6,10 @@ use super::{Batch, Trajectory};
 use crate::description::Variable;
 use crate::error::{Error, request};
 use crate::lookup::{Found, article, is_exact};
-use crate::selection::{Selection, apart, fits};
+use crate::selection::{Assigned, Selection, fits};
 use crate::system::System;
 use fmi_abi::{BaseType, Standard, Variability};
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 /// Numeric inputs and their values.
 #[derive(Default)]
@@ -27,18 +26,18 @@ pub(super) fn each_input<'a, 's>(
     exact: &mut Vec<Input>,
     mut numeric: impl FnMut(&'a str, Trajectory<'a>, Vec<Found<'s>>) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let mut known = HashMap::new();
+    let mut known = Assigned::default();
     for (name, trajectory) in batch.inputs.iter().filter(|(name, _)| !system.is_clocked(name)) {
         let variables = system.find(name)?;
         input_of(name, &variables)?;
-        apart(&mut known, name, &variables, "inputs")?;
+        known.add(name, &variables);
         if is_exact(variables[0].variable.base) {
             exact.push(Input::of(name, &variables, *trajectory, batch.time)?);
         } else {
             numeric(name, *trajectory, variables)?;
         }
     }
-    Ok(())
+    known.check("inputs")
 }
 
 /// Fails unless the variables with a name are an input, or another variable that may be set during a run.
@@ -62,15 +61,6 @@ pub(super) fn input_of(name: &str, variables: &[Found]) -> Result<(), Error> {
 /// Returns whether values of a variable are held between the times at which they are given; otherwise they are interpolated.
 pub(super) fn is_held(of: &Variable) -> bool {
     !of.base.is_float() || of.variability.is_some_and(|of| of != Variability::Continuous)
-}
-
-/// Adds a name. Fails if it is in `names` already.
-pub(super) fn once<'a>(names: &mut Vec<&'a str>, name: &'a str, list: &str) -> Result<(), Error> {
-    if names.contains(&name) {
-        return request(format!("{name} is twice among the {list}"));
-    }
-    names.push(name);
-    Ok(())
 }
 
 /// Checks the values of a numeric input. `time` are the communication points.

@@ -2,14 +2,14 @@
 
 use super::event_plan::EventPlan;
 use super::exact::Input;
-use super::inputs::{Inputs, checked, each_input, is_held, once};
+use super::inputs::{Inputs, checked, each_input, is_held};
 use super::model_exchange_plan::ModelExchangePlan;
 use super::{Batch, Column, Measure, Trajectory};
 use crate::continuous::Integration;
 use crate::error::{Error, request};
 use crate::instance::{Tolerance, check_equal_step};
 use crate::lookup::is_exact;
-use crate::selection::{Selection, Target};
+use crate::selection::{Assigned, Selection, Target};
 use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface, Standard, shown_number};
@@ -126,14 +126,14 @@ impl<'a> Plan<'a> {
             inputs.variables.push(name, &variables);
             Ok(())
         })?;
-        let (mut names, rate) = (Vec::new(), (BaseType::Real, Standard::Fmi2));
+        let (mut known, rate) = (Assigned::default(), (BaseType::Real, Standard::Fmi2));
         for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
-            once(&mut names, name, "input derivatives")?;
+            known.add(name, &variables);
             self.derivatives.values.push(checked(name, rate, *trajectory, true, batch.time)?);
             self.derivatives.variables.push(name, &variables);
         }
-        Ok(())
+        known.check("input derivatives")
     }
 }
 

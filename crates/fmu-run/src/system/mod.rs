@@ -19,7 +19,7 @@ use crate::fmu::Loaded;
 use crate::lookup::{Found, is_exact};
 use crate::messages::Feed;
 use crate::pool::Pool;
-use crate::selection::{Selection, apart};
+use crate::selection::{Assigned, Selection};
 pub use elements::Elements;
 use fmi_abi::description::{Fault, Offer};
 use fmi_abi::files::Limits;
@@ -157,15 +157,15 @@ impl System {
     /// # Errors
     /// Returns [`Error::Request`] if a name is unknown, or if the values of a variable are strings or bytes.
     pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
-        let (mut selection, mut known, mut targets) = (Selection::default(), HashMap::new(), HashMap::new());
+        let (mut selection, mut known, mut assigned) =
+            (Selection::default(), HashMap::new(), Assigned::default());
         for name in names.iter().map(AsRef::as_ref) {
             let found = self.find_numbers(name)?;
             selection.push_to(&mut known, name, &found);
-            // A variable may be read twice, but not set to two values.
-            if let Err(error) = apart(&mut targets, name, &found, "variables") {
-                selection.forbid(error.to_string());
-            }
+            assigned.add(name, &found);
         }
+        // A variable may be read twice, but not set to two values.
+        assigned.check("variables").unwrap_or_else(|error| selection.forbid(error.to_string()));
         Ok(selection)
     }
 
