@@ -175,6 +175,7 @@ def test_invalid_arguments(testbed) -> None:
             (lambda: wrists.step(), "either the size of the step or the time"),
             (lambda: wrists.step(1e-3, mask=[True]), "1 Booleans for 3 instances"),
             (lambda: wrists.restore(fmu.instances(3).save()), "states belong to other instances"),
+            (lambda: fmu.instances(3, start={"k1": [100.0]}), "k1 has 1 start values for 3 instances"),
             (lambda: fmu.instances(0), "count must be at least 1, it is 0"),
             (lambda: fmu.instances(-3), "count must be at least 1, it is -3"),
             (lambda: fmu.instances(2, threads=-1), "threads must be at least 1, it is -1"),

@@ -211,7 +211,6 @@ impl Instances {
                 ));
             }
             if let Some(count) = values.count()
-                && count != 1
                 && count != self.len()
             {
                 return request(format!("{name} has {count} start values for {} instances", self.len()));
