@@ -1,5 +1,6 @@
 //! Reads attributes of XML elements. A value of another type than the attribute's is an error and never a default.
 
+use crate::value::BLANKS;
 use crate::{Causality, DependencyKind, Initial, IntervalVariability, Variability, boolean, shown};
 use roxmltree::Node;
 
@@ -55,17 +56,24 @@ pub fn attribute<T: Typed>(node: Node, name: &str) -> Result<Option<T>, String> 
 /// Reads an attribute. The error is the value that is not of this type.
 pub(crate) fn value<'a, T: Typed>(node: Node<'a, '_>, name: &str) -> Option<Result<T, &'a str>> {
     let text = node.attribute(name)?;
-    Some(T::read(text.trim_matches(BLANKS)).ok_or(text))
+    Some(T::read(trimmed(text)).ok_or(text))
 }
 
 /// Reads an attribute that is a list of values between blanks. The error is the first value that is not of this type.
 pub(crate) fn values<'a, T: Typed>(node: Node<'a, '_>, name: &str) -> Option<Result<Vec<T>, &'a str>> {
-    let texts = node.attribute(name)?.split(BLANKS).filter(|text| !text.is_empty());
+    let texts = blank_separated(node.attribute(name)?);
     Some(texts.map(|text| T::read(text).ok_or(text)).collect())
 }
 
-/// The blanks of XML.
-const BLANKS: [char; 4] = [' ', '\t', '\r', '\n'];
+/// Returns a text without blanks at its ends. Other white space, such as a no-break space, is part of it.
+pub(crate) fn trimmed(text: &str) -> &str {
+    text.trim_matches(BLANKS)
+}
+
+/// Returns the texts between blanks.
+pub(crate) fn blank_separated(text: &str) -> impl Iterator<Item = &str> {
+    text.split(BLANKS).filter(|text| !text.is_empty())
+}
 
 /// Returns the message for a value that is not of the attribute's type.
 pub(crate) fn unreadable<T: Typed>(node: Node, name: &str, text: &str) -> String {

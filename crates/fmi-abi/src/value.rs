@@ -42,9 +42,12 @@ impl Value {
     }
 }
 
+/// The blanks of XML.
+pub(crate) const BLANKS: [char; 4] = [' ', '\t', '\r', '\n'];
+
 /// Parses a Boolean of XML: `true`, `false`, `1` or `0`.
 pub fn boolean(string: &str) -> Option<bool> {
-    match string.trim() {
+    match string.trim_matches(BLANKS) {
         "true" | "1" => Some(true),
         "false" | "0" => Some(false),
         _ => None,

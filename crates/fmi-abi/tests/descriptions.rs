@@ -94,6 +94,33 @@ fn attributes_that_cannot_be_read_are_reported() {
     assert_eq!(faults(fmi2("", &variable("x", "-1", "local", "<Real/>").repeat(1000), "")).len(), 100);
 }
 
+/// Of the white space, only the blanks of XML are not part of a value.
+#[test]
+fn a_no_break_space_does_not_separate_values() {
+    let variables =
+        "<Float64 name='u' valueReference='1' start='1\u{a0}2 3'><Dimension start='2'/></Float64>";
+    assert_eq!(fmi3(variables, "").variables[0].start, ["1\u{a0}2", "3"]);
+}
+
+#[test]
+fn versions_are_those_of_the_schema() {
+    for (version, is_read) in [
+        ("2.0", true),
+        ("3.0", true),
+        ("3.1.12", true),
+        ("3.0-beta.1", true),
+        ("2", false),
+        (" 2.0", false),
+        ("3.", false),
+        ("3.x", false),
+        ("3.0.0.0", false),
+        ("3.0-", false),
+    ] {
+        let text = format!("<fmiModelDescription fmiVersion='{version}'/>");
+        assert_eq!(ModelDescription::parse(&text).is_ok(), is_read, "{version}");
+    }
+}
+
 /// FMI 2.0 counts the variables of the file, including those that cannot be read (section 2.2.8).
 #[test]
 fn a_variable_that_cannot_be_read_does_not_shift_the_others() {

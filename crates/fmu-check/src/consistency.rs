@@ -191,7 +191,7 @@ mod tests {
     const EXPERIMENT: &str = r#"stepSize="0.01""#;
 
     #[rustfmt::skip]
-    const BROKEN: [Broken; 31] = [
+    const BROKEN: [Broken; 37] = [
         (2, "initial-unknowns", &[(r#"<Unknown index="9" dependencies="4"/>"#, "")]),
         (2, "initial-unknowns", &[("<InitialUnknowns>", r#"<InitialUnknowns><Unknown index="1"/>"#)]),
         (3, "initial-unknowns", &[(r#"<InitialUnknown valueReference="5" dependencies=""/>"#, "")]),
@@ -215,6 +215,9 @@ mod tests {
         (2, "names", &[(r#"guid="wagon""#, r#"guid="wagon" variableNamingConvention="structured""#), (r#"name="power""#, r#"name="power of x""#)]),
         (3, "names", &[(r#"derivative="5"/>"#, r#"derivative="5"><Alias name="x"/></Float64>"#)]),
         (3, "dimensions", &[(END, r#"<Float64 name="a" valueReference="20"><Dimension valueReference="10"/></Float64></ModelVariables>"#)]),
+        (3, "dimensions", &[(END, r#"<Float64 name="a" valueReference="20"><Dimension/></Float64></ModelVariables>"#)]),
+        (3, "dimensions", &[(END, r#"<UInt64 name="n" valueReference="21" causality="structuralParameter" start="2"/>
+            <Float64 name="a" valueReference="20"><Dimension start="2" valueReference="21"/></Float64></ModelVariables>"#)]),
         (3, "start", &[(END, r#"<Float64 name="a" valueReference="20" causality="parameter" start="1 2"><Dimension start="3"/></Float64></ModelVariables>"#)]),
         (3, "structure", &[(END, r#"<Float64 name="a" valueReference="20" derivative="77"/></ModelVariables>"#)]),
         (3, "structure", &[(r#"<EventIndicator valueReference="6"/>"#, r#"<EventIndicator valueReference="10"/>"#)]),
@@ -224,6 +227,10 @@ mod tests {
             (r#"<Real start="2"/>"#, r#"<Real declaredType="T" start="2"/>"#)]),
         (3, "types", &[(DEFINITIONS, r#"<TypeDefinitions><Int32Type name="T"/></TypeDefinitions><LogCategories>"#), (r#" start="2""#, r#" declaredType="T" start="2""#)]),
         (2, "units", &[(DEFINITIONS, r#"<UnitDefinitions><Unit name="m"/><Unit name="m"/></UnitDefinitions><LogCategories>"#)]),
+        (2, "units", &[(DEFINITIONS, r#"<UnitDefinitions><Unit name="m"><DisplayUnit name="mm" factor="1000"/><DisplayUnit name="mm" factor="1"/></Unit></UnitDefinitions><LogCategories>"#)]),
+        (3, "units", &[(DEFINITIONS, r#"<UnitDefinitions><Unit name="m"><DisplayUnit name="mm" factor="0"/></Unit></UnitDefinitions><LogCategories>"#)]),
+        (2, "interfaces", &[(DEFINITIONS, r#"<CoSimulation modelIdentifier="other"/><LogCategories>"#)]),
+        (3, "structure", &[(END, r#"<Float64 name="a" valueReference="20" derivative="20"/></ModelVariables>"#)]),
         (3, "types", &[(DEFINITIONS, r#"<TypeDefinitions><Float64Type name="T"/><Int32Type name="T"/></TypeDefinitions><LogCategories>"#)]),
         (3, "types", &[(DEFINITIONS, r#"<TypeDefinitions><EnumerationType name="T"><Item name="a" value="1"/><Item name="a" value="2"/></EnumerationType></TypeDefinitions><LogCategories>"#)]),
     ];

@@ -54,6 +54,7 @@ impl Description {
         let [start_time, stop_time, step_size] = written.default_experiment;
         let observation = |(fault, why): &(Fault, String)| {
             let rule = match fault {
+                Fault::Interface => "description.interfaces",
                 Fault::Reference => "description.references",
                 Fault::Type | Fault::Definition => "description.types",
                 Fault::Structure | Fault::Unknown => "description.structure",

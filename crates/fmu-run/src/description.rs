@@ -162,7 +162,10 @@ impl Description {
             return Err(why.to_owned());
         }
         let prevents_runs = |(fault, _): &&(Fault, String)| {
-            matches!(fault, Fault::Attribute | Fault::Reference | Fault::Type | Fault::Value)
+            matches!(
+                fault,
+                Fault::Attribute | Fault::Interface | Fault::Reference | Fault::Type | Fault::Value
+            )
         };
         if let Some((_, why)) = written.faults.iter().find(prevents_runs) {
             return Err(format!("modelDescription.xml: {why}"));

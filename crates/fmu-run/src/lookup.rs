@@ -81,7 +81,14 @@ impl Found<'_> {
             return Ok((1.0, 0.0));
         }
         let others = self.description.units.get(&**own).map_or(&[][..], |own| &own.display_units);
-        if let Some(of) = others.iter().find(|of| of.name == unit) {
+        let mut named = others.iter().filter(|of| of.name == unit);
+        if let Some(of) = named.next() {
+            if named.next().is_some() || of.factor == 0.0 {
+                let why = "has two definitions, or the factor 0";
+                return request(format!(
+                    "{name} cannot be given in {unit}, because the FMU's display unit {why}"
+                ));
+            }
             return Ok((of.factor, if self.variable.is_relative { 0.0 } else { of.offset }));
         }
         let known: Vec<_> = std::iter::once(&**own).chain(others.iter().map(|of| &*of.name)).collect();

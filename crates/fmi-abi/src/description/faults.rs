@@ -12,17 +12,22 @@ const MAX_FAULTS: usize = 100;
 pub enum Fault {
     /// The name of the model, its guid or instantiation token, a `modelIdentifier`, or the value of a `Start` is missing.
     Attribute,
+    /// There are two elements for one interface type, of which the first one counts.
+    Interface,
     /// A variable has no value reference.
     Reference,
     /// A variable has no type, or an unknown one.
     Type,
-    /// `ModelStructure` or the attribute `derivative` refers to a variable that does not exist, or does not fit together.
+    /// `ModelStructure` or the attribute `derivative` refers to a variable that does not exist, or does not fit together; or a variable is
+    /// the derivative of itself.
     Structure,
-    /// Two units have one name, of which the last one counts.
+    /// Two units have one name, of which the last one counts, or two display units of a unit have one name, or a display unit has the
+    /// factor 0.
     Unit,
     /// Two types, or two items of a type, have one name or value; or a variable and its declared type have other base types.
     Definition,
-    /// The size of an array is a variable that is neither a structural parameter nor a constant of type UInt64.
+    /// The size of an array is neither a number nor a variable, or both, or a variable that is neither a structural parameter nor a constant
+    /// of type UInt64.
     Dimension,
     /// `ModelStructure` lists a variable twice, of which the first entry counts, has `dependenciesKind` without a dependency for each, or an
     /// event indicator that is not a continuous floating-point number.

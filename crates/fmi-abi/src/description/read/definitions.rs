@@ -1,6 +1,7 @@
 //! Reads units, display units and declared types.
 
 use super::{attribute_or_empty, base_of, child};
+use crate::attribute::trimmed;
 use crate::description::faults::{Fault, Faults};
 use crate::description::{Attributes, Item, Type};
 use crate::{BaseType, BaseUnit, DisplayUnit, Standard, Unit, Value, shown};
@@ -24,7 +25,19 @@ pub(super) fn unit(node: Node, faults: &Faults) -> (String, Unit) {
         (!is_inverse).then_some(DisplayUnit { name, factor, offset })
     };
     let display_units = node.children().filter(|of| of.has_tag_name("DisplayUnit")).filter_map(display_unit);
-    (attribute_or_empty(node, "name"), Unit { base, display_units: display_units.collect() })
+    let (name, display_units) = (attribute_or_empty(node, "name"), display_units.collect::<Vec<_>>());
+    let mut names = HashSet::new();
+    for DisplayUnit { name: of, factor, .. } in &display_units {
+        if !names.insert(of) {
+            faults.add(Fault::Unit, || {
+                format!("two display units of {} are called {}", shown(&name), shown(of))
+            });
+        }
+        if *factor == 0.0 {
+            faults.add(Fault::Unit, || format!("the factor of the display unit {} is 0", shown(of)));
+        }
+    }
+    (name, Unit { base, display_units })
 }
 
 /// Reads a declared type. In FMI 2.0, a child element has the name of the base type and the attributes (section 2.2.3). In FMI 3.0, the
@@ -59,7 +72,7 @@ pub(super) fn attributes(
         // An f64 does not have all digits of an integer.
         Some(limit) => base
             .filter(|base| !base.is_float())
-            .and_then(|_| limit.trim().parse().ok().map(Value::Integer))
+            .and_then(|_| trimmed(limit).parse().ok().map(Value::Integer))
             .or_else(|| faults.read(node, name).map(Value::Real)),
         None => of_declared(declared?).clone(),
     };

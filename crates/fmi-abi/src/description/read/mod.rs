@@ -6,6 +6,7 @@ mod variables;
 
 use super::faults::{Fault, Faults};
 use super::{About, LogCategory, ModelDescription, Offer};
+use crate::attribute::trimmed;
 use crate::{BaseType, Standard, shown, shown_number};
 use definitions::{declared_type, unit};
 use roxmltree::Node;
@@ -34,7 +35,7 @@ impl ModelDescription {
         let version = attribute_or_empty(root, "fmiVersion");
         let (standard, token) = match version.as_str() {
             "2.0" => (Standard::Fmi2, "guid"),
-            version if version.starts_with("3.") => (Standard::Fmi3, "instantiationToken"),
+            version if is_version_3(version) => (Standard::Fmi3, "instantiationToken"),
             "1.0" => {
                 let why = "its fmiVersion is \"1.0\"; FMI 2.0 and 3.0 are supported here, and FMPy and PyFMI run FMI 1.0";
                 return Err(why.to_owned());
@@ -53,6 +54,10 @@ impl ModelDescription {
         needs(root, token);
         let offer = |name: &str| {
             let node = child(root, name)?;
+            // The schema of FMI 2.0 allows an element twice.
+            if root.children().filter(|child| child.has_tag_name(name)).nth(1).is_some() {
+                faults.add(Fault::Interface, || format!("there are two elements {name}"));
+            }
             needs(node, "modelIdentifier");
             Some(Offer::read(node, standard, &faults))
         };
@@ -108,13 +113,21 @@ impl ModelDescription {
             log_categories: named("LogCategories").map(category).collect(),
             units: elements(root, "UnitDefinitions").map(|node| unit(node, &faults)).collect(),
             types,
-            structured_names: root.attribute("variableNamingConvention").map(str::trim) == Some("structured"),
+            structured_names: root.attribute("variableNamingConvention").map(trimmed) == Some("structured"),
             faults: Vec::new(),
         };
         description.structure(root, &positions, &faults);
         description.faults = faults.into_list();
         Ok(description)
     }
+}
+
+/// Returns whether this is a version of FMI 3, such as 3.0, 3.1.2 or 3.0-beta.1, as the schema of FMI 3.0 defines them.
+fn is_version_3(version: &str) -> bool {
+    let (numbers, draft) = version.split_once('-').map_or((version, None), |(of, draft)| (of, Some(draft)));
+    let parts: Vec<&str> = numbers.split('.').collect();
+    let are_numbers = parts.iter().all(|part| !part.is_empty() && part.bytes().all(|of| of.is_ascii_digit()));
+    parts[0] == "3" && (2..=3).contains(&parts.len()) && are_numbers && draft != Some("")
 }
 
 /// Returns the base type of an XML element.

@@ -2,7 +2,7 @@
 
 use super::definitions::attributes;
 use super::{attribute_or_empty, base_of, elements};
-use crate::attribute::value;
+use crate::attribute::{blank_separated, trimmed, value};
 use crate::description::faults::{Fault, Faults};
 use crate::description::{Alias, Clock, MAX_VALUES, Type, Variable};
 use crate::{BaseType, Causality, Initial, Standard, Variability, shown};
@@ -43,7 +43,7 @@ pub(super) fn variables(
         nodes.iter().rev().filter_map(|node| Some((reference(node)?, quiet(*node, "start")))).collect();
     // Value references of the variables that may be sizes (section 2.4.7.2 of FMI 3.0).
     let is_size = |node: &&Node| {
-        let is = |name, value| node.attribute(name).map(str::trim) == Some(value);
+        let is = |name, value| node.attribute(name).map(trimmed) == Some(value);
         node.has_tag_name("UInt64")
             && (is("causality", "structuralParameter") || is("variability", "constant"))
     };
@@ -89,6 +89,13 @@ pub(super) fn variables(
         }
         // A size is a number, or the value of a structural parameter (section 2.4.7.2 of FMI 3.0).
         let size = |dimension: Node| {
+            let has = |name| dimension.has_attribute(name);
+            if has("start") == has("valueReference") {
+                let count = if has("start") { "both start and" } else { "neither start nor" };
+                faults.add(Fault::Dimension, || {
+                    format!("a Dimension of {} has {count} valueReference", named())
+                });
+            }
             faults.read(dimension, "start").or_else(|| {
                 let parameter = faults.read(dimension, "valueReference")?;
                 if !sizes.contains(&parameter) {
@@ -108,7 +115,7 @@ pub(super) fn variables(
     }
     let by_reference: HashMap<u32, usize> =
         found.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
-    for (variable, derivative) in found.iter_mut().zip(derivatives) {
+    for (index, (variable, derivative)) in found.iter_mut().zip(derivatives).enumerate() {
         let Some(of) = derivative else { continue };
         let state = match standard {
             Standard::Fmi2 => positions.find(of),
@@ -120,6 +127,10 @@ pub(super) fn variables(
                 .add(Fault::Structure, || format!("{name} is the derivative of {of}, which does not exist"));
         }
         variable.derivative_of = state.flatten();
+        if variable.derivative_of == Some(index) {
+            let name = shown(&variable.name);
+            faults.add(Fault::Structure, || format!("{name} is the derivative of itself"));
+        }
     }
     Ok((found, positions))
 }
@@ -189,7 +200,7 @@ fn start_values(node: Node, of_type: Node, base: Option<BaseType>, faults: &Faul
     let list = of_type.attribute("start");
     let start: Vec<String> = match base {
         Some(BaseType::String | BaseType::Binary) | None => list.map(str::to_owned).into_iter().collect(),
-        Some(_) => list.unwrap_or_default().split_whitespace().map(str::to_owned).collect(),
+        Some(_) => blank_separated(list.unwrap_or_default()).map(str::to_owned).collect(),
     };
     if !start.is_empty() {
         return start;
