@@ -2,6 +2,7 @@
 
 use crate::finding::Finding;
 use anyhow::Context as _;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Line of a baseline. It accepts all observations of a rule, or only those that contain `text`; it may also accept that an
@@ -42,6 +43,7 @@ impl Baseline {
             let why = "is not of the form NAME: REASON or NAME \"PART OF THE OBSERVATION\": REASON";
             (number, why.to_owned())
         };
+        let mut new = HashSet::new();
         let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let accepted =
             lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
@@ -55,10 +57,20 @@ impl Baseline {
                     None => (None, rest),
                 };
                 let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
-                let known = crate::rules::is_known(name)
+                let is_rule = crate::rules::is_known(name);
+                let known = is_rule
                     || crate::options::INTERFACES.contains(&name)
                     || crate::rules::TOPICS.contains(&name);
                 match reason {
+                    Some(_) if known && !is_rule && text.is_some() => Err((
+                        number,
+                        format!(
+                            "has a part of an observation, but {name} is no rule, so it has no observations"
+                        ),
+                    )),
+                    Some(_) if known && !new.insert((name, text.clone())) => {
+                        Err((number, format!("accepts {name} again, like a line above; keep one of them")))
+                    }
                     Some(reason) if known => {
                         Ok(Accepted { name: name.to_owned(), text, reason: reason.to_owned() })
                     }
@@ -137,6 +149,8 @@ mod tests {
             ("logs.silent", 1, "is not of the form NAME: REASON"),
             ("# all\nlogs.silent:", 2, "is not of the form NAME: REASON"),
             ("logs.silen: typo", 1, "has \"logs.silen\", which is no rule"),
+            ("co-simulation \"a\": b", 1, "has a part of an observation, but co-simulation is no rule"),
+            ("logs.silent: a\nlogs.silent \"b\": a\nlogs.silent: b", 3, "accepts logs.silent again"),
             ("logs.silent \"a: b", 1, "is not of the form NAME: REASON"),
         ] {
             let (number, why) = Baseline::parse(text).err().unwrap_or_default();

@@ -49,7 +49,7 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
     /// Prints a rule, its severity and its section of the standard; `all` prints all rules.
-    #[arg(long, value_name = "RULE")]
+    #[arg(long, value_name = "RULE", exclusive = true)]
     pub explain: Option<String>,
     /// Writes report.html, report.json, junit.xml and report.sarif to this directory.
     #[arg(long, value_name = "DIRECTORY")]

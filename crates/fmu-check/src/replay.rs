@@ -9,7 +9,7 @@ use crate::report::SCHEMA;
 use crate::reproduce::{Printed, expectation};
 use crate::run::{Manner, Stop};
 use crate::worker;
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use clap::builder::RangedU64ValueParser;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Standard, one_line};
@@ -166,7 +166,9 @@ fn find<'r>(report: &'r Report, wanted: &str) -> anyhow::Result<(usize, &'r Find
     let numbers = 1..=report.findings.len();
     let is_wanted =
         |(number, finding): &(usize, &Finding)| finding.name == wanted || number.to_string() == wanted;
-    numbers.zip(&report.findings).find(is_wanted).with_context(|| {
+    let found: Vec<_> = numbers.zip(&report.findings).filter(is_wanted).collect();
+    ensure!(found.len() < 2, "the report has {} findings {wanted}; give the number of one", found.len());
+    found.into_iter().next().with_context(|| {
         let names: Vec<&str> = report.findings.iter().map(|finding| finding.name.as_str()).collect();
         format!("the report has no finding {wanted}; its findings are {}", names.join(", "))
     })
