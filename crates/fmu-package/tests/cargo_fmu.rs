@@ -300,6 +300,12 @@ fn inputs_come_from_a_table(directory: &Directory) {
         (&["run", "--set", "der(y)=1"], "there is no variable der(y) to set; did you mean der(x)?"),
         (&["run", "--show", "y"], "there is no variable y to show"),
         (&["run", "--step", "0"], "--step 0 positive"),
+        (&["run", "--stop", "1", "--step", "0.3"], "not a whole number; change --stop or --step"),
+        (&["run", "--show", "x,u,x"], "x is twice among the variables of --show"),
+        (&["run", "--set", "u=1", "--input", "step.csv"], "so --set u has no effect"),
+        (&["build", "--", "--tunable"], "has no program build_fmu"),
+        (&["check", "--fmu", "target/fmu/my_lag.fmu", "--package", "my-lag"], "cannot be used with"),
+        (&["check", "--explain", "logs.silent", "--quick"], "cannot be used with"),
         (&["run", "--input", "nothing.csv"], "nothing.csv"),
     ] {
         let output = directory.rejects("my-lag", arguments);

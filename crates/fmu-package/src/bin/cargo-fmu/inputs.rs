@@ -132,7 +132,11 @@ pub fn value(description: &Description, variable: &Variable, text: &str) -> Resu
         },
         BaseType::Enumeration => {
             let items = description.items(variable).unwrap_or_default();
-            let found = items.iter().find(|item| item.name == text || text.parse() == Ok(item.value));
+            // An item may be called like the value of another one, and names come first.
+            let found = items
+                .iter()
+                .find(|item| item.name == text)
+                .or_else(|| items.iter().find(|item| text.parse() == Ok(item.value)));
             let names = || items.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
             let item = found.with_context(|| format!("it must be one of {}", names()))?;
             Ok(Value::Real(item.value as f64))
@@ -182,6 +186,7 @@ mod tests {
     const MODEL: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
         <CoSimulation modelIdentifier="m"/>
         <TypeDefinitions><EnumerationType name="Mode"><Item name="closed" value="1"/><Item name="open" value="5"/>
+        <Item name="7" value="6"/><Item name="6" value="7"/>
         </EnumerationType></TypeDefinitions>
         <ModelVariables>
             <Float64 name="time" valueReference="0" causality="independent"/>
@@ -227,6 +232,9 @@ mod tests {
         assert_eq!(values(&table, "gear"), [3.0, -4.0, 5.0].map(Value::Real));
         assert_eq!(values(&table, "speed"), [1e-310, -0.0, 7.0].map(Value::Real));
         assert_eq!(values(&table, "p[2]"), [2.0, 3.0, 4.0].map(Value::Real));
+        // The items 7 and 6 have the values 6 and 7.
+        let table = read("time,mode\n0,7\n1,6\n2,5\n").unwrap();
+        assert_eq!(values(&table, "mode"), [6.0, 7.0, 5.0].map(Value::Real));
     }
 
     #[test]
@@ -242,8 +250,8 @@ mod tests {
             ("time,speed\n0,\n", "line 2: speed cannot be \"\": it must be a finite number"),
             ("time;speed\n0,5;1\n", "line 2: time cannot be \"0,5\": write numbers with a decimal point"),
             ("time,speed\n0,1\n0.5\n", "record 2 (line: 3"),
-            ("time,mode\n0,opem\n", "line 2: mode cannot be \"opem\": it must be one of closed, open"),
-            ("time,mode\n0,2\n", "line 2: mode cannot be \"2\": it must be one of closed, open"),
+            ("time,mode\n0,opem\n", "line 2: mode cannot be \"opem\": it must be one of closed, open, 7, 6"),
+            ("time,mode\n0,2\n", "line 2: mode cannot be \"2\": it must be one of closed, open, 7, 6"),
             ("time,gear\n0,2.5\n", "line 2: gear cannot be \"2.5\": it must be an integer"),
             ("time,count\n0,2.5\n", "line 2: count cannot be \"2.5\": it must be an integer"),
             ("time,on\n0,2\n", "line 2: on cannot be \"2\": it must be true or false"),

@@ -14,13 +14,13 @@ mod project;
 mod results;
 mod run;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use builder::Purpose;
 use clap::Parser;
 use fmu_package::{BuildOptions, terminal};
 use project::{Package, Project};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The command line, with `fmu` as the first argument of cargo.
@@ -44,7 +44,7 @@ enum Command {
         build: BuildOptions,
         /// After `--`: options of the package's own build_fmu
         #[arg(last = true, value_name = "OPTIONS")]
-        _own: Vec<OsString>,
+        own: Vec<OsString>,
     },
     /// Build the FMUs and simulate one: writes a table (CSV) and a plot (SVG) of the outputs
     Run(run::Options),
@@ -53,7 +53,7 @@ enum Command {
         #[command(flatten)]
         package: Package,
         /// Check this FMU from any tool instead of building FMUs; repeat the option for several FMUs
-        #[arg(long)]
+        #[arg(long, conflicts_with_all = ["package", "manifest_path"])]
         fmu: Vec<PathBuf>,
         /// Also compare Co-Simulation with Model Exchange for these inputs over time: a CSV file as for `run --input`
         #[arg(long, value_name = "FILE")]
@@ -81,10 +81,19 @@ fn main() -> ExitCode {
 fn carry_out(command: &Command) -> Result<ExitCode> {
     let succeeds = match command {
         Command::New(options) => new::new(options).map(|()| true),
-        Command::Build { package, build, .. } => {
-            builder::build(&Project::find(package)?, build, Purpose::Release, &builder::arguments_of_build())
+        Command::Build { package, build, own } => {
+            let project = Project::find(package)?;
+            ensure!(
+                own.is_empty() || project.own_builder.is_some(),
+                "{} has no program build_fmu, whose options follow --; put options of this command before --",
+                project.name
+            );
+            builder::build(&project, build, Purpose::Release, &builder::arguments_of_build())
         }
         Command::Run(options) => run::run(options),
+        Command::Check { check, .. } if check.explain.is_some() => {
+            return Ok(fmu_check::command(Path::new(""), check));
+        }
         Command::Check { package, fmu, input, check } => run::check(package, fmu, input.as_deref(), check),
         Command::Judge(options) => judge::judge(options),
         Command::Replay(options) => return Ok(fmu_check::replay(options)),

@@ -99,7 +99,7 @@ fn create(options: &Options) -> Result<()> {
         fs::create_dir_all(parent).with_context(|| format!("cannot create {}", parent.display()))?;
         let text = match options.from {
             // The type of the smallest model gets the name of the crate; the types of the others keep their names.
-            Begin::Lag => renamed(&renamed(text, "lag", &crate_name), "Lag", &camel(&crate_name)),
+            Begin::Lag => renamed(&renamed(text, "lag", &crate_name), "Lag", &type_name(&crate_name)),
             _ if file.starts_with("tests/") => {
                 text.replace(&format!("use {model}::"), &format!("use {crate_name}::"))
             }
@@ -275,6 +275,14 @@ fn renamed(text: &str, word: &str, replacement: &str) -> String {
     result + rest
 }
 
+/// Returns the name of the type of the smallest model. It is not a name that this model uses for something else, such as `Model`.
+fn type_name(crate_name: &str) -> String {
+    let used =
+        ["CoSimulation", "Error", "Info", "Model", "ModelExchange", "Result", "Self", "Step", "Stepped"];
+    let name = camel(crate_name);
+    if used.contains(&&*name) { format!("My{name}") } else { name }
+}
+
 /// Returns a crate name as the name of a Rust type.
 fn camel(name: &str) -> String {
     let capital = |word: &str| {
@@ -285,4 +293,21 @@ fn camel(name: &str) -> String {
             .unwrap_or_default()
     };
     name.split('_').map(capital).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::type_name;
+
+    #[test]
+    fn types_do_not_hide_those_of_the_template() {
+        for (name, type_of_model) in [
+            ("heat_pump", "HeatPump"),
+            ("model", "MyModel"),
+            ("co_simulation", "MyCoSimulation"),
+            ("steps", "Steps"),
+        ] {
+            assert_eq!(type_name(name), type_of_model);
+        }
+    }
 }

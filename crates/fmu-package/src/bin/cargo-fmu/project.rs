@@ -56,15 +56,13 @@ impl Project {
             bail!("{name} does not use fmu-export: cargo fmu new creates a model that does");
         }
         let programs = targets.iter().filter(|target| list(&target["kind"]).contains(&"bin".into()));
-        let mut programs = programs.map(|target| text(&target["name"]));
+        let programs = programs.map(|target| text(&target["name"]));
         let directory = Path::new(text(&package["manifest_path"])).parent();
         Ok(Self {
             name: name.to_owned(),
             directory: directory.context("cargo names no Cargo.toml")?.to_owned(),
             workspace: text(&metadata["workspace_root"]).into(),
-            own_builder: programs
-                .find(|name| *name == "build_fmu" || name.starts_with("build_fmu_"))
-                .map(str::to_owned),
+            own_builder: own_builder(programs)?.map(str::to_owned),
         })
     }
 }
@@ -93,6 +91,21 @@ fn missing_path(manifest: &Path) -> Option<String> {
     })
 }
 
+/// Returns the program that builds the FMU: `build_fmu`, or the only one whose name begins with `build_fmu_`.
+fn own_builder<'a>(programs: impl Iterator<Item = &'a str>) -> Result<Option<&'a str>> {
+    let is_builder = |name: &&str| *name == "build_fmu" || name.starts_with("build_fmu_");
+    let builders: Vec<_> = programs.filter(is_builder).collect();
+    match builders[..] {
+        [] => Ok(None),
+        [only] => Ok(Some(only)),
+        _ if builders.contains(&"build_fmu") => Ok(Some("build_fmu")),
+        _ => bail!(
+            "the package has several programs that build FMUs ({}); call one build_fmu",
+            builders.join(", ")
+        ),
+    }
+}
+
 fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }
@@ -115,6 +128,23 @@ fn chosen<'a>(metadata: &'a Value, name: Option<&str>) -> Result<&'a Value> {
         _ => {
             let names: Vec<_> = packages.iter().map(|package| text(&package["name"])).collect();
             bail!("there are several packages here; choose with --package: {}", names.join(", "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::own_builder;
+
+    #[test]
+    fn one_program_builds_the_fmu() {
+        for (programs, builder) in [
+            (&["main", "build"][..], Ok(None)),
+            (&["main", "build_fmu_tank"], Ok(Some("build_fmu_tank"))),
+            (&["build_fmu_tank", "build_fmu"], Ok(Some("build_fmu"))),
+            (&["build_fmu_tank", "build_fmu_lag"], Err(())),
+        ] {
+            assert_eq!(own_builder(programs.iter().copied()).map_err(|_| ()), builder, "{programs:?}");
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::motion::{Comparison, Motion, examine};
 use crate::plot::plot;
 use crate::project::{Package, Project};
 use crate::results::{Column, write_table};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use fmi_abi::Causality;
 use fmu_package::terminal::{fmi_version, short};
 use fmu_package::{BuildOptions, Standard};
@@ -167,7 +167,12 @@ fn once(options: &Options) -> Result<bool> {
     if !builder::build(&project, &build, Purpose::Development, &arguments)? {
         return Ok(false);
     }
-    let fmu = newest(&directory, begin).or_else(|| newest(&directory.join("fmi3"), begin));
+    // An FMU of the other version may be as new, if it was built just before.
+    let of_version = |fmi: Standard, directory: &Path| {
+        options.fmi.is_none_or(|only| only == fmi).then(|| newest(directory, begin)).flatten()
+    };
+    let fmu = of_version(Standard::Fmi2, &directory)
+        .or_else(|| of_version(Standard::Fmi3, &directory.join("fmi3")));
     let fmu = fmu.with_context(|| format!("there is no new FMU in {}", short(&directory)))?;
     simulate(options, &fmu, &directory)
 }
@@ -201,6 +206,13 @@ fn simulate(options: &Options, path: &Path, directory: &Path) -> Result<bool> {
     let shown = shown(&options.show, description)?;
     let starts = options.set.iter().map(|(name, value)| starts(description, name, value));
     let starts = starts.collect::<Result<Vec<_>>>()?.concat();
+    // The first row of a table is at the start of the run.
+    let inputs = table.as_ref().map(Table::trajectories).unwrap_or_default();
+    if let Some((name, _)) = starts.iter().find(|(name, _)| inputs.iter().any(|(input, _)| input == name)) {
+        bail!(
+            "{name} has a column in the table of --input, so --set {name} has no effect; leave out one of them"
+        );
+    }
     let mut time = times([options.stop, options.step], description, table.as_ref())?;
     let points = time.clone();
     let (runs, watch) = follow(fmu.system(), &time, table.as_ref(), &starts, &shown)?;
@@ -323,10 +335,16 @@ fn times(
     let stop = own_stop.or(end_of_table).or(stop).unwrap_or(start + 1.0);
     let step = own_step.or(step).unwrap_or((stop - start) / 500.0);
     ensure!(step > 0.0 && stop > start, "--stop {stop} must be after {start}, and --step {step} positive");
-    let steps = ((stop - start) / step).round();
+    let count = (stop - start) / step;
+    let steps = count.round();
     ensure!(
         (1.0..=1e7).contains(&steps),
         "{steps} steps of {step} s are too few or too many; change --stop or --step"
+    );
+    // Only the end of a table or of the default experiment may be rounded to a step.
+    ensure!(
+        own_stop.is_none() && own_step.is_none() || (count - steps).abs() <= 1e-6,
+        "from {start} to {stop} s are {count} steps of {step} s, not a whole number; change --stop or --step"
     );
     // A sum of steps would accumulate rounding errors.
     Ok((0..=steps as u32).map(|number| start + f64::from(number) * step).collect())
@@ -345,6 +363,11 @@ fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a V
     let mut shown = Vec::new();
     for name in names {
         shown.extend(named(description, name, "show")?);
+    }
+    // The table could not be read by these names.
+    for (index, variable) in shown.iter().enumerate() {
+        let is_again = shown[..index].iter().any(|before| before.name == variable.name);
+        ensure!(!is_again, "{} is twice among the variables of --show", variable.name);
     }
     Ok(shown)
 }
