@@ -1,6 +1,8 @@
 //! Executes the calls of a finding in a report again.
 
-use crate::call_sequence::{Action, Arg, CallSequence, Numbered, Setting, action_name, all_actions, unfold};
+use crate::call_sequence::{
+    Action, Arg, CallSequence, End, Numbered, Setting, action_name, all_actions, unfold,
+};
 use crate::checker::Checker;
 use crate::evidence::{Evidence, Replay};
 use crate::opening::opened;
@@ -13,6 +15,7 @@ use anyhow::{Context as _, bail, ensure};
 use clap::builder::RangedU64ValueParser;
 use fmi_abi::calls::signatures;
 use fmi_abi::{Standard, one_line};
+use std::collections::HashSet;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -96,6 +99,7 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
     let folded = with_token(&replay.sequence, &report.token, &description.token);
     let sequence = unfold(&folded);
     check_libraries(&sequence, &checker)?;
+    check_numbers(replay, &sequence)?;
     let Replay { soft, now, ref evidence, .. } = *replay;
     let (limit, repetitions) = (options.limit.min(replay.limit), options.limit.min(replay.repetitions));
     let setting = Setting { soft, now, repetitions, ..checker.setting.clone() };
@@ -111,6 +115,10 @@ fn show(options: &ReplayOptions) -> anyhow::Result<bool> {
         let again = || checker.workers.execute_as(Manner::Again, &setting, &sequence, limit);
         let other = if evidence.varies() { Some(again()?) } else { None };
         let shows = evidence.shows(&run, other.as_ref(), &sequence);
+        // Calls that are cut off do not show whether the fault is still there.
+        if !shows && let End::Hang(_) = run.end {
+            bail!("the calls have not ended in {limit} s; allow more with --limit");
+        }
         shown += usize::from(shows);
         if time == 1 {
             print(&format!("Calls of {}:", path.display()));
@@ -228,6 +236,21 @@ fn check_libraries(sequence: &CallSequence, checker: &Checker) -> anyhow::Result
             let unchecked = checker.all_unchecked().into_iter().find(|unchecked| unchecked.name == name);
             let why = unchecked.map_or("the FMU does not offer it".to_owned(), |unchecked| unchecked.why);
             bail!("{name} cannot be called: {why}");
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the calls have time, and that those whose results show the finding are among them. Otherwise it could never show.
+fn check_numbers(replay: &Replay, sequence: &CallSequence) -> anyhow::Result<()> {
+    for (name, seconds) in [("limit", replay.limit), ("repetitions", replay.repetitions)] {
+        ensure!(seconds > 0.0, "the report is damaged: {name} is {seconds} s");
+    }
+    if let Evidence::Same(expected, pairs) = &replay.evidence {
+        let known: HashSet<u32> = all_actions(sequence).iter().map(|numbered| numbered.id).collect();
+        let mut needed = expected.iter().map(|call| call.id).chain(pairs.iter().flatten().copied());
+        if let Some(id) = needed.find(|id| !known.contains(id)) {
+            bail!("the report is damaged: the finding needs call {id}, which does not exist");
         }
     }
     Ok(())

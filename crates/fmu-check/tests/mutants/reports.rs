@@ -241,6 +241,20 @@ fn calls_show_it() {
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && text.contains(why), "{text}");
     }
+    // Nor must one whose calls are cut off.
+    let file = directory.path().join("out/report.json");
+    let report = std::fs::read_to_string(&file).expect("the report");
+    let mut report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let limit = report["findings"][0]["replay"]["limit"].as_f64().expect("a number");
+    for (limit, option, why) in
+        [(limit, "1e-6", "have not ended in 0.000001 s"), (-1.0, "9", "the report is damaged: limit is -1 s")]
+    {
+        report["findings"][0]["replay"]["limit"] = limit.into();
+        std::fs::write(&file, report.to_string()).expect("a file");
+        let output = replay(&directory.path().join("out"), "1", &["--limit", option]).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && text.contains(why), "{text}");
+    }
 }
 
 /// Asserts that parameters are read after Initialization Mode, because FMI 2.0 does not let importers read them in it.
