@@ -233,9 +233,9 @@ impl Draw {
         let types = self.list(4, |draw| (draw.name(), draw.declared()));
         let count = self.random.below(8) + 1;
         let mut variables: Vec<_> = (0..count).map(|number| self.variable(number, &types)).collect();
-        for variable in &mut variables {
-            variable.derivative_of =
-                self.some(|draw| draw.random.below(count)).filter(|_| variable.base.is_some());
+        for (index, variable) in variables.iter_mut().enumerate() {
+            let other = self.some(|draw| draw.random.below(count)).filter(|other| *other != index);
+            variable.derivative_of = other.filter(|_| variable.base.is_some());
         }
         let is_fmi3 = self.standard == Standard::Fmi3;
         let all: Vec<usize> = (0..count).collect();
