@@ -241,7 +241,7 @@ fn calls_show_it() {
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && text.contains(why), "{text}");
     }
-    // Nor must one whose calls are cut off.
+    // Calls that were cut off, or have no time at all, do not show that the fault is repaired.
     let file = directory.path().join("out/report.json");
     let report = std::fs::read_to_string(&file).expect("the report");
     let mut report: serde_json::Value = serde_json::from_str(&report).expect("JSON");

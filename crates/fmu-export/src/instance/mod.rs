@@ -382,7 +382,7 @@ impl<M: Exported> Instance<M> {
         for index in vr.iter().map(|vr| vr.index()) {
             match self.find(index) {
                 Some(of) if of.element() == 0 => count += of.length(),
-                // More may follow than the importer's array has, if the length is wrong.
+                // If the length is wrong, the next reference may be outside of the importer's array, so none is read.
                 _ => return self.reject_index(index),
             }
         }

@@ -112,7 +112,7 @@ fn partial_derivatives_of_arrays() {
     fmu.rejected_with(&["there are 9 unknowns, the array has 2 elements"], |_| {
         call(&mut [0.0; 2], PIECES + 1)
     });
-    // A wrong number of references is noticed at the first one that is not of a variable.
+    // If the number of references is too large, the first one that belongs to no variable is rejected, and no later one is read.
     let (wrong, many, mut found) = ([vr(Name::T), u32::MAX], 1 << 40, [f64::NAN; PIECES]);
     let (knowns, result, unknown) =
         (wrong.as_ptr(), found.as_mut_ptr(), "no variable with value reference 4294967295");

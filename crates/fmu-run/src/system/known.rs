@@ -6,8 +6,8 @@ use roxmltree::Node;
 /// An element, the elements in it and its attributes besides those of every element (section 4.1 of SSP 1.0).
 pub(super) type Known = (&'static str, &'static [&'static str], &'static [&'static str]);
 
-/// Calls `warn` with a message for each element and attribute that is not known. What is in an element without a row in the table, such as
-/// an annotation, is not checked.
+/// Calls `warn` with a message for each element and attribute that is not in the table. Elements without a row, such as annotations, may
+/// contain anything.
 pub(super) fn warn_of_others(node: Node, table: &[Known], warn: &mut dyn FnMut(String)) {
     let name = node.tag_name().name();
     let Some((_, elements, attributes)) = table.iter().find(|known| known.0 == name) else { return };

@@ -207,7 +207,7 @@ def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
     inner = content.get("parameters")
     if not isinstance(inner, dict):
         return {name: _value(path, name, entry, loaded, False) for name, entry in content.items()}
-    # In the report of an identification, which names its FMU, the parameters are one member of several.
+    # A report of `identify` has a member `fmu`, and its parameters are in a member of their own.
     report = "fmu" in content
     if report and content.get("identified", True) is not True:
         raise UserError(

@@ -167,7 +167,8 @@ fn once(options: &Options) -> Result<bool> {
     if !builder::build(&project, &build, Purpose::Development, &arguments)? {
         return Ok(false);
     }
-    // An FMU of the other version may be as new, if it was built just before.
+    // The time of a file tells only that it was built about now, so an FMU of the other version that an earlier command built
+    // seconds ago must not be chosen.
     let of_version = |fmi: Standard, directory: &Path| {
         options.fmi.is_none_or(|only| only == fmi).then(|| newest(directory, begin)).flatten()
     };
